@@ -1,0 +1,37 @@
+"""The tables. `Base.metadata` knows all of them once this package is imported."""
+
+from app.store.tables.base import Base
+from app.store.tables.equipment import (
+    CertificatePosition,
+    Gyro,
+    GyroType,
+    Stand,
+    StandCertificate,
+    Start,
+    TypeLimit,
+)
+from app.store.tables.measurement import Measurement, MeasuringSession, Record
+from app.store.tables.people import Account, Login, SignInLink, Token
+from app.store.tables.results import Calibration, CalibrationParameter, IdempotentReply, Job
+
+__all__ = [
+    "Account",
+    "Base",
+    "Calibration",
+    "CalibrationParameter",
+    "CertificatePosition",
+    "Gyro",
+    "GyroType",
+    "IdempotentReply",
+    "Job",
+    "Login",
+    "Measurement",
+    "MeasuringSession",
+    "Record",
+    "SignInLink",
+    "Stand",
+    "StandCertificate",
+    "Start",
+    "Token",
+    "TypeLimit",
+]

@@ -1,0 +1,109 @@
+"""Gyros and their types, stands and their certificates."""
+
+from datetime import date, datetime
+
+import sqlalchemy as sa
+from sqlalchemy.orm import Mapped, mapped_column, relationship
+
+from app.store.tables.base import Base
+
+
+class GyroType(Base):
+    """A type of gyro; its limits are entered by the laboratory."""
+
+    __tablename__ = "gyro_type"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    name: Mapped[str] = mapped_column(unique=True)
+    note: Mapped[str] = mapped_column(default="")
+
+    limits: Mapped[list["TypeLimit"]] = relationship(lazy="selectin", cascade="all, delete-orphan")
+
+
+class TypeLimit(Base):
+    """Between what a parameter of the type has to lie, in laboratory units."""
+
+    __tablename__ = "type_limit"
+
+    type_id: Mapped[int] = mapped_column(sa.ForeignKey("gyro_type.id"), primary_key=True)
+    parameter: Mapped[str] = mapped_column(primary_key=True)
+    low: Mapped[float]
+    high: Mapped[float]
+
+
+class Gyro(Base):
+    """One gyro, known by its serial number."""
+
+    __tablename__ = "gyro"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    serial: Mapped[str] = mapped_column(unique=True)
+    type_id: Mapped[int] = mapped_column(sa.ForeignKey("gyro_type.id"), index=True)
+    note: Mapped[str] = mapped_column(default="")
+    created_at: Mapped[datetime]
+
+    type: Mapped[GyroType] = relationship(lazy="joined", innerjoin=True)
+
+
+class Start(Base):
+    """A power-up of a gyro: its bias differs from start to start, so each is kept."""
+
+    __tablename__ = "start"
+    __table_args__ = (sa.UniqueConstraint("gyro_id", "number"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    gyro_id: Mapped[int] = mapped_column(sa.ForeignKey("gyro.id"))
+    number: Mapped[int]
+    powered_up_at: Mapped[datetime]
+    note: Mapped[str] = mapped_column(default="")
+
+
+class Stand(Base):
+    """A two-axis stand in its place."""
+
+    __tablename__ = "stand"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    name: Mapped[str] = mapped_column(unique=True)
+    latitude_deg: Mapped[float]
+    note: Mapped[str] = mapped_column(default="")
+    created_at: Mapped[datetime]
+
+
+class StandCertificate(Base):
+    """One version of a stand's certificate. It never changes; a new one has the next version."""
+
+    __tablename__ = "stand_certificate"
+    __table_args__ = (sa.UniqueConstraint("stand_id", "number"), sa.UniqueConstraint("stand_id", "version"))
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    stand_id: Mapped[int] = mapped_column(sa.ForeignKey("stand.id"))
+    number: Mapped[str]
+    version: Mapped[int]
+    valid_from: Mapped[date]
+    valid_until: Mapped[date]
+    issued_by: Mapped[str] = mapped_column(default="")
+    digest: Mapped[str]
+    created_at: Mapped[datetime]
+    created_by: Mapped[str]
+
+    stand: Mapped[Stand] = relationship(lazy="joined", innerjoin=True)
+    positions: Mapped[list["CertificatePosition"]] = relationship(
+        lazy="selectin", order_by="(CertificatePosition.theta_deg, CertificatePosition.psi_deg)"
+    )
+
+
+class CertificatePosition(Base):
+    """Certified misalignment at one position; standard uncertainties where the certificate gives them."""
+
+    __tablename__ = "certificate_position"
+
+    certificate_id: Mapped[int] = mapped_column(sa.ForeignKey("stand_certificate.id"), primary_key=True)
+    theta_deg: Mapped[float] = mapped_column(primary_key=True)
+    psi_deg: Mapped[float] = mapped_column(primary_key=True)
+    alpha_arcsec: Mapped[float]
+    beta_arcsec: Mapped[float]
+    gamma_arcsec: Mapped[float]
+    u_alpha_arcsec: Mapped[float | None]
+    u_beta_arcsec: Mapped[float | None]
+    u_gamma_arcsec: Mapped[float | None]
