@@ -18,7 +18,7 @@ class RecordFiles:
     """A folder of content-addressed files: ``ab/cdef….parquet``."""
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder
+        self.folder = folder
 
     def put(self, content: bytes, suffix: str) -> str:
         """Keep the bytes and give their SHA-256 as hexadecimal digits; present bytes are not rewritten."""
@@ -38,12 +38,12 @@ class RecordFiles:
             Path(temporary).unlink(missing_ok=True)
             raise
         _sync_folder(target.parent)
-        _sync_folder(self._folder)
+        _sync_folder(self.folder)
         return digest
 
     def path(self, digest: str, suffix: str) -> Path:
         """Where the bytes with this digest are."""
-        return self._folder / digest[:2] / f"{digest[2:]}.{suffix}"
+        return self.folder / digest[:2] / f"{digest[2:]}.{suffix}"
 
     def read(self, digest: str, suffix: str) -> bytes:
         """The bytes, checked against their name.
@@ -60,7 +60,7 @@ class RecordFiles:
 
     def __iter__(self) -> Iterator[tuple[str, Path]]:
         """Every stored file as (digest, path)."""
-        for path in sorted(self._folder.glob("??/*.*")):
+        for path in sorted(self.folder.glob("??/*.*")):
             if not path.name.startswith("."):
                 yield path.parent.name + path.name.split(".", 1)[0], path
 

@@ -1,0 +1,112 @@
+"""Gyros, their types and their starts."""
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+
+from app.errors import Conflict, Invalid, NotFound, problem
+from app.services import verdicts
+from app.services.lab import Work
+from app.services.names import checked_name
+from app.services.views import GyroView, Page, TypeView
+from app.store import equipment, results
+from app.store.tables import Calibration, Gyro, GyroType, Start, TypeLimit
+from solver.records import PARAMETERS
+
+
+def add_gyro(work: Work, serial: str, type_name: str, note: str = "") -> GyroView:
+    """Register a gyro; an unknown type is created empty."""
+    serial, type_name = checked_name(serial, "serial"), checked_name(type_name, "type")
+    if equipment.gyro(work.db, serial) is not None:
+        raise Conflict(
+            problem("gyro-exists", "There is a gyro %(serial)s already.", column="serial", serial=serial)
+        )
+    kind = equipment.gyro_type(work.db, type_name) or GyroType(name=type_name, note="")
+    row = Gyro(serial=serial, type=kind, note=note, created_at=work.now)
+    work.db.add(row)
+    work.db.flush()
+    return _gyro_view(row, None)
+
+
+def change_gyro(work: Work, serial: str, *, type_name: str | None, note: str | None) -> GyroView:
+    """Correct a gyro's type or note; None leaves it."""
+    row = find_gyro(work, serial)
+    if type_name is not None:
+        name = checked_name(type_name, "type")
+        row.type = equipment.gyro_type(work.db, name) or GyroType(name=name, note="")
+    if note is not None:
+        row.note = note
+    work.db.flush()
+    return gyro(work, serial)
+
+
+def gyro(work: Work, serial: str) -> GyroView:
+    """One gyro with its latest result."""
+    row = find_gyro(work, serial)
+    return _gyro_view(row, results.newest_of_gyros(work.db, [row.id]).get(row.id))
+
+
+def gyros(
+    work: Work, *, type_name: str | None = None, after: str | None = None, limit: int = 50
+) -> Page[GyroView]:
+    """Gyros by serial number, each with its latest result."""
+    rows = equipment.gyros(work.db, type_name=type_name, after=after, limit=limit + 1)
+    newest = results.newest_of_gyros(work.db, [row.id for row in rows[:limit]])
+    items = tuple(_gyro_view(row, newest.get(row.id)) for row in rows[:limit])
+    return Page(items, items[-1].serial if len(rows) > limit else None)
+
+
+def types(work: Work) -> tuple[TypeView, ...]:
+    """Every type with its limits and the number of its gyros."""
+    return tuple(
+        TypeView(kind.name, kind.note, count, {item.parameter: (item.low, item.high) for item in kind.limits})
+        for kind, count in equipment.types_with_counts(work.db)
+    )
+
+
+def set_limits(work: Work, type_name: str, limits: Mapping[str, tuple[float, float]], note: str = "") -> None:
+    """Enter a type's limits, in laboratory units; they replace the ones before."""
+    for parameter, (low, high) in limits.items():
+        if parameter not in PARAMETERS:
+            raise Invalid(problem("unknown-parameter", "There is no parameter “%(name)s”.", name=parameter))
+        if not low < high:
+            raise Invalid(
+                problem("bad-limit", "The lower limit must be below the upper one.", column=parameter)
+            )
+    kind = equipment.gyro_type(work.db, type_name) or GyroType(
+        name=checked_name(type_name, "type"), note=note
+    )
+    work.db.add(kind)
+    kind.limits.clear()
+    work.db.flush()
+    kind.limits.extend(TypeLimit(parameter=name, low=low, high=high) for name, (low, high) in limits.items())
+    work.db.flush()
+
+
+def add_start(work: Work, row: Gyro, powered_up_at: datetime, note: str = "") -> Start:
+    """Count a new power-up of the gyro."""
+    last = equipment.last_start(work.db, row.id)
+    start = Start(gyro_id=row.id, number=last.number + 1 if last else 1,
+                  powered_up_at=powered_up_at.astimezone(UTC), note=note)  # fmt: skip
+    work.db.add(start)
+    work.db.flush()
+    return start
+
+
+def find_gyro(work: Work, serial: str) -> Gyro:
+    """The gyro's row, or `NotFound`."""
+    row = equipment.gyro(work.db, serial)
+    if row is None:
+        raise NotFound(problem("unknown-gyro", "There is no gyro %(serial)s. Register it first.",
+                               column="gyro", serial=serial))  # fmt: skip
+    return row
+
+
+def _gyro_view(row: Gyro, newest: Calibration | None) -> GyroView:
+    session = newest.session if newest else None
+    return GyroView(
+        serial=row.serial, type=row.type.name, note=row.note, created_at=row.created_at,
+        last_session=session.id if session else None,
+        last_measured_at=session.started_at if session else None,
+        last_stand=session.stand.name if session else None,
+        last_result=verdicts.summary(newest) if newest else None,
+    )  # fmt: skip
