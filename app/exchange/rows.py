@@ -1,6 +1,6 @@
 """Rows in laboratory units, as every reader gives them and every writer takes them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
 
@@ -24,7 +24,10 @@ class CertificateRow:
 
 @dataclass(frozen=True, slots=True)
 class MeansRow:
-    """Mean torquer currents of one measured position. `repeat` counts from 0."""
+    """Mean torquer currents of one measured position. `repeat` counts from 0.
+
+    `line` is where the row stood in its file, for problems found later; it is no part of the value.
+    """
 
     theta_deg: float
     psi_deg: float
@@ -37,6 +40,7 @@ class MeansRow:
     started_at: datetime | None = None
     temperature_c: float | None = None
     repeat: int = 0
+    line: int | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,99 @@
+"""Currents a thousand times too large or too small: a unit other than the header says.
+
+The whole Earth rate is about 7 µA for a scale factor of 10 rad/(s·A). A file whose currents are
+all far from that is only warned of, for other gyros have other scale factors; nothing is ever
+rescaled silently. One row that is a thousand times off the others of its file is refused.
+"""
+
+from collections.abc import Sequence
+from statistics import median
+from typing import Final
+
+from app.exchange.headers import Column
+from app.exchange.problems import Problems
+from app.exchange.rows import MeansRow
+from solver.constants import EARTH_RATE
+from solver.errors import Message
+from solver.units import ma_from_ampere
+
+_USUAL_SCALE: Final = 10.0  # rad/(s·A)
+USUAL_MA: Final = ma_from_ampere(EARTH_RATE / _USUAL_SCALE)
+"""Current for the whole Earth rate, mA."""
+
+_HALF_WAY: Final = 1000.0**0.5
+_SLIP: Final = 1000.0
+_FEWEST: Final = 4  # rows from which "the others" can be told
+
+
+def current_unit(rows: Sequence[MeansRow], columns: dict[str, Column], problems: Problems) -> list[Message]:
+    """Note rows that slipped by a factor of 1000; warn when the whole file looks like another unit."""
+    sizes = [max(abs(row.jx_ma), abs(row.jy_ma)) for row in rows]
+    usual = median(sizes)
+    if not usual:
+        return []
+    if len(rows) >= _FEWEST:
+        _check_too_large(rows, sizes, columns, problems)
+        _check_too_small(rows, sizes, columns, problems)
+    if USUAL_MA / _HALF_WAY <= usual <= USUAL_MA * _HALF_WAY:
+        return []
+    return [_other_unit(usual, columns["jx"].name, problems.file or "")]
+
+
+def _check_too_large(
+    rows: Sequence[MeansRow], sizes: Sequence[float], columns: dict[str, Column], problems: Problems
+) -> None:
+    """A current above a hundred times the median that fits the others once divided by 1000."""
+    usual = median(sizes)
+    others = [size for size in sizes if size <= 100.0 * usual]
+    for row in rows:
+        for name, value in (("jx", row.jx_ma), ("jy", row.jy_ma)):
+            if abs(value) > 100.0 * usual and abs(value) / _SLIP <= 3.0 * max(others):
+                problems.note(_slipped("large", value), row=row.line, column=columns[name].name)
+
+
+def _check_too_small(
+    rows: Sequence[MeansRow], sizes: Sequence[float], columns: dict[str, Column], problems: Problems
+) -> None:
+    """One row alone with both currents far below all others, which fits them once multiplied by 1000.
+
+    Alone, because honest currents may vanish together at every ψ of one θ (the spin axis along
+    the Earth's, at a pole).
+    """
+    smallest, next_one = sorted(sizes)[:2]
+    fits = 0.1 * median(sizes) <= smallest * _SLIP <= 3.0 * max(sizes)
+    if fits and smallest < next_one / 30.0:
+        row = rows[list(sizes).index(smallest)]
+        problems.note(_slipped("small", smallest), row=row.line, column=columns["jx"].name)
+
+
+def _slipped(which: str, value: float) -> Message:
+    if which == "large":
+        return Message(
+            "current-unit",
+            "%(value)g mA is about 1000 times the other currents of this file. Write it in the unit of the "
+            "column's name.",
+            {"value": value},
+        )
+    return Message(
+        "current-unit",
+        "The currents of this row, at most %(value)g mA, are about 1000 times smaller than those of all "
+        "other rows. Write them in the unit of the column's name.",
+        {"value": value},
+    )
+
+
+def _other_unit(usual: float, name: str, file: str) -> Message:
+    values = {"file": file, "value": usual, "name": name, "usual": USUAL_MA}
+    if usual > USUAL_MA:
+        return Message(
+            "current-unit",
+            "%(file)s: currents of about %(value).3g mA are large for a gyro in the Earth rate (usual are "
+            "%(usual).1g mA). If %(name)s is really in µA, name the columns jx_ua and jy_ua.",
+            values,
+        )
+    return Message(
+        "current-unit",
+        "%(file)s: currents of about %(value).3g mA are small for a gyro in the Earth rate (usual are "
+        "%(usual).1g mA). If %(name)s is really in A, name the columns jx_a and jy_a.",
+        values,
+    )

@@ -1,0 +1,179 @@
+"""A calibration as JSON in laboratory units: what the API, the command and the pages give out."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+
+from app.exchange.si import PARAMETER_UNITS, covariance_lab, parameter_lab
+from solver import units
+from solver.errors import Message
+from solver.records import PARAMETERS, Array, Calibration, Estimate, Failure, Fit, Observations
+
+ResultMethod = Literal["least-squares", "paper", "both"]
+Json = dict[str, Any]
+
+
+def calibration_json(calibration: Calibration, method: ResultMethod) -> Json:
+    """Write a calibration as JSON: parameters, covariance, residuals, fit, iterations, warnings.
+
+    Parameters
+    ----------
+    calibration
+        What the solver answered; it must hold the method asked for.
+    method
+        One method gives its result at the top level. ``both`` gives each under its own name,
+        whole, so that a reader of one needs nothing from outside it.
+
+    Returns
+    -------
+    dict
+        Only what JSON knows: a value that is unknown or not finite is None. A method that gave no
+        estimate has ``error`` instead of its numbers, with the rounds it went through.
+    """
+    if method != "both":
+        return _one(calibration, method)
+    return {
+        "method": "both",
+        "solver_version": calibration.solver_version,
+        "input_hash": calibration.input_hash,
+        "paper": _one(calibration, "paper"),
+        "least-squares": _one(calibration, "least-squares"),
+    }
+
+
+def _one(calibration: Calibration, method: Literal["least-squares", "paper"]) -> Json:
+    answer = calibration.paper if method == "paper" else calibration.least_squares
+    if answer is None:
+        raise ValueError(f"this calibration has no answer of the method {method}")
+    head = {
+        "method": method,
+        "solver_version": calibration.solver_version,
+        "input_hash": calibration.input_hash,
+    }
+    if isinstance(answer, Failure):
+        return {**head, "error": message_json(answer.message), "iterations": _iterations(answer.iterations)}
+    return {**head, **_estimate(answer, calibration.observations)}
+
+
+def _estimate(estimate: Estimate, observations: Observations) -> Json:
+    return {
+        "parameters": parameters_json(estimate.values, estimate.standard_uncertainties),
+        "covariance": [[finite(cell) for cell in row] for row in covariance_lab(estimate.covariance)],
+        "uncertainty_basis": estimate.uncertainty_basis,
+        "residuals": _residuals(estimate, observations),
+        "fit": _fit(estimate.fit),
+        "iterations": _iterations(estimate.iterations),
+        "warnings": [message_json(warning) for warning in estimate.warnings],
+    }
+
+
+def parameters_json(values: Sequence[float] | Array, uncertainties: Sequence[float] | Array | None) -> Json:
+    """Write parameters by name, with standard uncertainty, in both units.
+
+    Parameters
+    ----------
+    values, uncertainties
+        SI, in the order of `solver.records.PARAMETERS`; NaN where undetermined.
+    """
+    known = [math.nan] * len(PARAMETERS) if uncertainties is None else uncertainties
+    return {
+        name: {
+            "value": finite(parameter_lab(name, float(value))),
+            "standard_uncertainty": finite(parameter_lab(name, float(u))),
+            "unit": PARAMETER_UNITS[name][0],
+            "value_si": finite(value),
+            "unit_si": PARAMETER_UNITS[name][1],
+        }
+        for name, value, u in zip(PARAMETERS, values, known, strict=True)
+    }
+
+
+def _residuals(estimate: Estimate, observations: Observations) -> list[Json]:
+    rates = units.deg_per_h_from_rad_per_s(estimate.residuals)
+    return [
+        {
+            "theta_deg": _angle(theta),
+            "psi_deg": _angle(psi),
+            "repeat": int(repeat),
+            "x_deg_per_h": finite(rate[0]),
+            "y_deg_per_h": finite(rate[1]),
+            "standardised_x": finite(standardised[0]),
+            "standardised_y": finite(standardised[1]),
+            "outlier_x": bool(outlier[0]),
+            "outlier_y": bool(outlier[1]),
+        }
+        for theta, psi, repeat, rate, standardised, outlier in zip(
+            observations.theta,
+            observations.psi,
+            observations.repeat,
+            rates,
+            estimate.standardised,
+            estimate.outliers,
+            strict=True,
+        )
+    ]
+
+
+def _angle(angle_rad: float) -> float:
+    """Stand angle in degrees as it was written: rounding takes off what the two conversions left."""
+    return round(units.deg_from_rad(float(angle_rad)), 11) % 360.0
+
+
+def _fit(fit: Fit) -> Json:
+    return {
+        "chi2": finite(fit.chi2),
+        "dof": int(fit.dof),
+        "p_value": finite(fit.p_value),
+        "rank": int(fit.rank),
+        "condition": finite(fit.condition),
+    }
+
+
+def _iterations(rounds: Array | None) -> list[Json]:
+    """The paper's approximations, one object per round; none for least squares."""
+    if rounds is None:
+        return []
+    return [
+        {name: finite(parameter_lab(name, float(value))) for name, value in zip(PARAMETERS, row, strict=True)}
+        for row in np.asarray(rounds)
+    ]
+
+
+def message_json(message: Message) -> Json:
+    """Write a message: its code and sentence, and what another language needs to say it."""
+    plain: Json = {"code": message.code, "message": message.text}
+    if message.values:
+        plain |= {"template": message.template, "values": _plain(message.values)}
+    return plain
+
+
+def message_from(stored: Mapping[str, Any]) -> Message:
+    """Read back what `message_json` wrote."""
+    template = stored.get("template") or stored["message"]
+    return Message(stored["code"], template, stored.get("values") or {})
+
+
+def _plain(value: Any) -> Any:
+    """Turn a message's values into what JSON knows."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float):
+        return finite(value)
+    return value if isinstance(value, str | int | bool | None) else str(value)
+
+
+def finite(value: float | None) -> float | None:
+    """The number, or None when it is unknown or not finite: JSON has no NaN."""
+    return None if value is None or not math.isfinite(value) else float(value)
+
+
+def dumps(content: Any, *, indent: int | None = None) -> str:
+    """Write JSON, equal content to equal bytes: keys in their given order, no NaN, letters as they are."""
+    return json.dumps(content, ensure_ascii=False, allow_nan=False, indent=indent)
