@@ -92,6 +92,12 @@ def add_start(work: Work, row: Gyro, powered_up_at: datetime, note: str = "") ->
     return start
 
 
+def starts(work: Work, serial: str) -> int:
+    """How often the gyro has been powered up, as far as it was counted here."""
+    last = equipment.last_start(work.db, find_gyro(work, serial).id)
+    return last.number if last else 0
+
+
 def find_gyro(work: Work, serial: str) -> Gyro:
     """The gyro's row, or `NotFound`."""
     row = equipment.gyro(work.db, serial)

@@ -1,6 +1,6 @@
 """A gyro's parameters over time."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 
 from app.errors import Invalid, problem
@@ -34,10 +34,14 @@ def history(
     points: dict[str, list[HistoryPoint]] = {name: [] for name in PARAMETERS if parameter in (None, name)}
     for value, result in rows:
         points[value.parameter].append(_point(value, result, limits))
-    return tuple(
-        HistorySeries(name, PARAMETER_UNITS[name].lab, *limits.get(name, (None, None)), tuple(found))
-        for name, found in points.items()
-    )
+    return tuple(_series(name, limits.get(name, (None, None)), found) for name, found in points.items())
+
+
+def _series(
+    name: str, limits: tuple[float | None, float | None], points: Sequence[HistoryPoint]
+) -> HistorySeries:
+    low, high = limits
+    return HistorySeries(name, PARAMETER_UNITS[name][0], low, high, tuple(points))
 
 
 def _point(

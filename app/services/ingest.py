@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from app.errors import Invalid, NotFound, problem
+from app.exchange.positions import same_angle
 from app.exchange.rows import MeansRow
 from app.services import calibrations, jobs, stands
 from app.services.lab import Work
@@ -13,7 +14,6 @@ from app.services.views import JobView, MeasurementView
 from app.store import measurement
 from app.store.tables import Measurement, MeasuringSession, Record
 
-_SAME_PLACE_DEG: Final = 1e-6
 _CONTENT: Final = ("jx_ma", "jy_ma", "u_jx_ma", "u_jy_ma", "duration_s", "rate_hz", "measured_at",
                    "temperature_c", "record_digest", "source_digest", "note")  # fmt: skip
 
@@ -120,7 +120,12 @@ def request_import(
 
 def prepare_import(work: Work, session_id: int, request: Mapping[str, Any]) -> dict[str, Any]:
     """What the reading process needs."""
-    return {"records": str(work.files.folder), "source": request["source"], "name": request["name"]}
+    return {
+        "records": str(work.files.folder),
+        "source": request["source"],
+        "name": request["name"],
+        "suffix": source_suffix(request["name"]),
+    }
 
 
 def store_import(work: Work, session_id: int, request: Mapping[str, Any], output: Mapping[str, Any]) -> None:
@@ -136,9 +141,15 @@ def store_import(work: Work, session_id: int, request: Mapping[str, Any], output
         calibrations.request(work, session_id, request["method"])
 
 
+def source_suffix(name: str) -> str:
+    """Suffix under which an uploaded file's bytes are kept: its own where it is a plain one."""
+    suffix = name.lower().rsplit("/", 1)[-1].partition(".")[2]
+    return suffix if suffix.replace(".", "").isalnum() and len(suffix) <= 16 else "bin"
+
+
 def _certified_place(session: MeasuringSession, row: MeansRow) -> tuple[float, float]:
     for certified in stands.certificate_rows(session.certificate):
-        if _same_angle(certified.theta_deg, row.theta_deg) and _same_angle(certified.psi_deg, row.psi_deg):
+        if same_angle(certified.theta_deg, row.theta_deg) and same_angle(certified.psi_deg, row.psi_deg):
             return certified.theta_deg, certified.psi_deg
     raise Invalid(
         problem(
@@ -150,7 +161,3 @@ def _certified_place(session: MeasuringSession, row: MeansRow) -> tuple[float, f
             psi=row.psi_deg,
         )
     )
-
-
-def _same_angle(one_deg: float, other_deg: float) -> bool:
-    return abs((one_deg - other_deg + 180.0) % 360.0 - 180.0) < _SAME_PLACE_DEG

@@ -76,7 +76,7 @@ def parameter_views(
             name=row.parameter,
             value=row.value,
             u=row.standard_uncertainty,
-            unit=PARAMETER_UNITS[row.parameter].lab,
+            unit=PARAMETER_UNITS[row.parameter][0],
             low=low,
             high=high,
             verdict=judge(row.value, row.standard_uncertainty, low, high),

@@ -1,0 +1,186 @@
+"""A demonstration laboratory: six gyros of two types, a stand with two certificates, a year of sessions.
+
+Gyro 0417 drifts, 0423 jumps; the latest session of each gyro keeps its full records of currents,
+the older ones their means. Everything goes in through the same services as a real laboratory's
+data, and every result is solved from them.
+"""
+
+import random
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+from typing import Any, Final
+
+import numpy as np
+
+from app.exchange.records import means_row, write_record_parquet
+from app.exchange.rows import CertificateRow, CurrentRecord, MeansRow
+from app.services import access, calibrations, gyros, ingest, stands
+from app.services.computing import solved
+from app.services.lab import Lab, Person, Work
+from app.services.sessions import NewSession, open_session
+from app.services.simulated import certificate_lab, truth_lab
+from app.store import measurement
+from simdevice.bench import Bench, SimulatedPosition, mean_currents, run_session
+from simdevice.certificate import draw_certificate, sixteen_positions
+from simdevice.fleet import DAY, FleetGyro, demonstration_fleet
+from simdevice.stand import Stand
+from solver.units import deg_from_rad, ma_from_ampere, rad_from_deg
+
+SEED: Final = 2026
+LATITUDE_DEG: Final = 55.7558
+SESSIONS: Final = 17
+"""Sessions of each gyro over the year."""
+DEMO_ACCOUNT: Final = "sokolov"
+_PEOPLE: Final = (("petrova", "I. Petrova", "technician"), (DEMO_ACCOUNT, "A. Sokolov", "metrologist"),
+                  ("orlova", "N. Orlova", "quality"))  # fmt: skip
+_LIMITS: Final = {
+    "GVK-6": {"kx": (1980.0, 2140.0), "ky": (1960.0, 2120.0), "kxy": (-25.0, 25.0), "kyx": (-25.0, 25.0),
+              "w0x": (-6.0, 6.0), "w0y": (-6.0, 6.0), "wg": (-15.0, 15.0), "wk": (-6.0, 6.0)},
+    "DTG-4": {"kx": (790.0, 860.0), "ky": (790.0, 870.0), "kxy": (-20.0, 20.0), "kyx": (-20.0, 20.0),
+              "w0x": (-14.0, 14.0), "w0y": (-14.0, 14.0), "wg": (-25.0, 25.0), "wk": (-12.0, 12.0)},
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class _Visit:
+    """One session of one gyro: when, in which start, its number, and whether its records are kept."""
+
+    gyro: FleetGyro
+    at: datetime
+    time: float
+    start: int
+    number: int
+    last: bool
+
+
+def build(lab: Lab, now: datetime | None = None) -> None:
+    """Fill an empty laboratory; one transaction, so that an interrupted build leaves nothing."""
+    now = (now or datetime.now(UTC)).replace(microsecond=0)
+    with lab.write(access.SYSTEM) as work:
+        for name, full_name, role in _PEOPLE:
+            access.add_account(work, name, role, full_name=full_name)
+        fleet = demonstration_fleet(SEED)
+        for kind, limits in _LIMITS.items():
+            gyros.set_limits(work, kind, limits)
+        for item in fleet:
+            gyros.add_gyro(work, item.serial, item.kind.name)
+        certified = _equip(work, now)
+        for visit in _visits(fleet, now):
+            _measure(work, visit, *_stand_at(certified, visit.at))
+        _leave_one_open(work, fleet[2], certified[-1][1], certified[-1][2], now)
+
+
+def _equip(work: Work, now: datetime) -> list[tuple[datetime, Stand, list[CertificateRow]]]:
+    """Stand S1 with two successive certificates; each as (valid from, true stand, rows)."""
+    first = Stand(rad_from_deg(LATITUDE_DEG), draw_certificate(SEED), seed=SEED)
+    stands.add_stand(work, "S1", LATITUDE_DEG, "Room 12, pier 1")
+    certified = []
+    for number, stand, begin in (
+        ("C-16", first, now - timedelta(days=500)),
+        ("C-17", first.recertified(SEED + 1), now - timedelta(days=160)),
+    ):
+        rows = certificate_lab(stand.certificate)
+        end = (begin + timedelta(days=365)).date()
+        stands.add_certificate(work, "S1", number, begin.date(), end, rows, "Regional metrology centre")
+        certified.append((begin, stand, rows))
+    return certified
+
+
+def _stand_at(
+    certified: Sequence[tuple[datetime, Stand, list[CertificateRow]]], at: datetime
+) -> tuple[Stand, list[CertificateRow]]:
+    _, stand, rows = [item for item in certified if item[0].date() <= at.date()][-1]
+    return stand, rows
+
+
+def _visits(fleet: Sequence[FleetGyro], now: datetime) -> Iterator[_Visit]:
+    """Every session of the year in the order of time; a gyro is switched on anew for most of them."""
+    shuffle = random.Random(SEED)
+    visits = []
+    for place, gyro in enumerate(fleet):
+        start = 0
+        for number in range(SESSIONS):
+            day = 4 + (number + place / len(fleet)) * 360 / SESSIONS
+            at = now - timedelta(days=365 - round(day), hours=-shuffle.randrange(7) + now.hour - 9,
+                                 minutes=shuffle.randrange(60))  # fmt: skip
+            start += shuffle.random() < 0.8 or not number
+            visits.append(_Visit(gyro, at, day * DAY, start, number, number == SESSIONS - 1))
+    yield from sorted(visits, key=lambda visit: visit.at)
+
+
+def _measure(work: Work, visit: _Visit, stand: Stand, rows: Sequence[CertificateRow]) -> None:
+    work.now = visit.at + timedelta(minutes=43)
+    work.person = Person("petrova", "I. Petrova", "technician", frozenset())
+    bench = visit.gyro.bench(stand, visit.time, visit.start, visit.number)
+    new_start = visit.start > gyros.starts(work, visit.gyro.serial)
+    session = open_session(
+        work,
+        NewSession(
+            visit.gyro.serial, "S1", started_at=visit.at, origin="simulation", new_start=new_start,
+            temperature_c=round(21.5 + np.sin(visit.time / (60 * DAY)), 1), truth=truth_lab(bench.gyro),
+        ),
+    )  # fmt: skip
+    if visit.last:
+        _keep_records(work, session.id, bench)
+    else:
+        for row in _means(bench, visit.at):
+            ingest.save_means(work, session.id, row, ingest.Source("simulation"))
+    _solve(work, session.id, rows)
+
+
+def _keep_records(work: Work, session_id: int, bench: Bench) -> None:
+    for item in run_session(bench, sixteen_positions()).positions:
+        record = _record(item)
+        content = write_record_parquet(record)
+        digest = work.files.put(content, "parquet")
+        row = means_row(record)
+        stored = ingest.StoredRecord(digest, len(item.t), row.duration_s or 0.0, row.rate_hz or 0.0)
+        ingest.save_record(work, session_id, row, stored, ingest.Source("simulation", digest))
+
+
+def _record(item: SimulatedPosition) -> CurrentRecord:
+    return CurrentRecord(
+        _degrees(item.theta), _degrees(item.psi), item.t, ma_from_ampere(item.jx), ma_from_ampere(item.jy)
+    )
+
+
+def _means(bench: Bench, at: datetime) -> list[MeansRow]:
+    means = mean_currents(bench, sixteen_positions())
+    jx_ma, jy_ma, u_jx_ma, u_jy_ma = (
+        ma_from_ampere(column).tolist() for column in (means.jx, means.jy, means.u_jx, means.u_jy)
+    )
+    return [
+        MeansRow(
+            _degrees(means.theta[row]), _degrees(means.psi[row]), jx_ma[row], jy_ma[row], u_jx_ma[row],
+            u_jy_ma[row], means.duration, means.rate, at + timedelta(minutes=2.5 * row),
+        )
+        for row in range(len(means.theta))
+    ]  # fmt: skip
+
+
+def _solve(work: Work, session_id: int, rows: Sequence[CertificateRow]) -> None:
+    measured = measurement.current(work.db, session_id)
+    output = solved([calibrations.means_row(row) for row in measured], rows, LATITUDE_DEG, "both")
+    wanted: dict[str, Any] = {"method": "both", "inputs": [row.id for row in measured]}
+    calibrations.store(work, session_id, wanted, output)
+
+
+def _leave_one_open(
+    work: Work, gyro: FleetGyro, stand: Stand, rows: Sequence[CertificateRow], now: datetime
+) -> None:
+    """A session of today, twelve of sixteen positions typed: somebody is at work."""
+    begun = now - timedelta(minutes=50)
+    work.now = begun
+    session = open_session(
+        work, NewSession(gyro.serial, "S1", started_at=begun, new_start=True, temperature_c=21.6)
+    )
+    bench = gyro.bench(stand, 365 * DAY, 99, 99)
+    for row in _means(bench, begun)[:12]:
+        work.now = row.started_at or begun
+        typed = replace(row, jx_ma=round(row.jx_ma, 7), jy_ma=round(row.jy_ma, 7), u_jx_ma=None, u_jy_ma=None)
+        ingest.save_means(work, session.id, typed, ingest.Source("typed"))
+
+
+def _degrees(angle: float) -> float:
+    return round(float(deg_from_rad(angle)), 9)

@@ -1,0 +1,103 @@
+"""The job engine's book: what each job computes, and what becomes of the answer.
+
+Every call is one short transaction; nothing is open while a child process computes.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from app.errors import Problem, problem
+from app.jobs.ledger import Task
+from app.services import calibrations, ingest, simulations
+from app.services.access import SYSTEM
+from app.services.job_views import stored_problem
+from app.services.lab import Lab, Person, Work
+from app.store import results
+from app.store.tables import Job
+
+MAX_ATTEMPTS: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    function: str
+    prepare: Callable[[Work, int, Mapping[str, Any]], dict[str, Any]]
+    store: Callable[[Work, int, Mapping[str, Any], Mapping[str, Any]], int | None]
+
+
+_KINDS: Final = {
+    "calibrate": _Kind("app.services.computing:calibrate", calibrations.prepare, calibrations.store),
+    "import": _Kind("app.services.computing:import_records", ingest.prepare_import, ingest.store_import),
+    "simulate": _Kind("app.services.computing:simulate", simulations.prepare, simulations.store),
+}
+
+
+class JobLedger:
+    """Implements `app.jobs.Ledger` over the job table."""
+
+    def __init__(self, lab: Lab) -> None:
+        self._lab = lab
+
+    def begin(self, job_id: str) -> Task | None:
+        """Mark a job running and say what to compute; None when there is nothing to do any more."""
+        with self._lab.write(SYSTEM) as work:
+            row = _open_job(work, job_id)
+            if row is None:
+                return None
+            row.attempts += 1
+            if row.attempts > MAX_ATTEMPTS:
+                _end(work, row, "failed", [_gave_up()])
+                return None
+            row.state, row.started_at = "running", work.now
+            return Task(_KINDS[row.kind].function, _KINDS[row.kind].prepare(work, _session(row), row.request))
+
+    def progress(self, job_id: str, fraction: float, phase: str) -> None:
+        """Note how far a job is."""
+        with self._lab.write(SYSTEM) as work:
+            row = _open_job(work, job_id)
+            if row is not None:
+                row.progress, row.phase = fraction, phase
+
+    def succeed(self, job_id: str, output: Mapping[str, Any]) -> None:
+        """Keep a job's answer; a job that has ended meanwhile keeps its end."""
+        with self._lab.write(SYSTEM) as work:
+            row = _open_job(work, job_id)
+            if row is None:
+                return
+            work.person = Person(row.created_by, row.created_by, "", frozenset())
+            row.calibration_id = _KINDS[row.kind].store(work, _session(row), row.request, output)
+            row.progress = 1.0
+            _end(work, row, "succeeded", None)
+
+    def fail(self, job_id: str, problems: Sequence[Problem]) -> None:
+        """Note why a job failed."""
+        with self._lab.write(SYSTEM) as work:
+            row = _open_job(work, job_id)
+            if row is not None:
+                _end(work, row, "failed", problems)
+
+
+def _open_job(work: Work, job_id: str) -> Job | None:
+    row = results.job(work.db, job_id)
+    return row if row is not None and row.state in results.ACTIVE else None
+
+
+def _session(row: Job) -> int:
+    if row.session_id is None:
+        raise ValueError(f"job {row.id} belongs to no session")
+    return row.session_id
+
+
+def _end(work: Work, row: Job, state: str, problems: Sequence[Problem] | None) -> None:
+    row.state, row.finished_at, row.phase = state, work.now, ""
+    row.problems = None if problems is None else [stored_problem(item) for item in problems]
+
+
+def _gave_up() -> Problem:
+    return problem(
+        "job-gave-up",
+        "The computing process died %(attempts)d times on this job, so it is not tried again. "
+        "Its input is kept; tell whoever looks after this installation.",
+        attempts=MAX_ATTEMPTS,
+    )
