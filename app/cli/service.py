@@ -1,0 +1,84 @@
+"""Running the service, and keeping its database up to date."""
+
+import socket
+from collections.abc import Callable
+from typing import Annotated
+
+import typer
+import uvicorn
+
+from app.cli.options import Data, settings
+from app.errors import Conflict, problem
+from app.main import create_app
+from app.services.opening import open_lab
+from app.settings import Settings
+
+Port = Annotated[int, typer.Option("--port", min=0, max=65535, help="Port; 0 takes any that is free.")]
+_GRACE_S = 3
+
+
+def serve(
+    host: Annotated[str, typer.Option("--host", help="Address to listen on.")] = "127.0.0.1",
+    port: Port = 8000,
+    workers: Annotated[int, typer.Option("--workers", min=1, help="Jobs that compute at once.")] = 2,
+    data: Data = None,
+) -> None:
+    """Run the service with its workers: pages, API and jobs."""
+    run(settings(data, workers=workers), host, port, lambda url: typer.echo(f"Driftbook is on {url}"))
+
+
+def migrate(data: Data = None) -> None:
+    """Bring the database up to date."""
+    with open_lab(settings(data)) as lab:
+        typer.echo(f"{lab.settings.data} is up to date.")
+
+
+def run(lab_settings: Settings, host: str, port: int, ready: Callable[[str], None]) -> None:
+    """Serve until interrupted; `ready` is called with the address once requests are answered.
+
+    Raises
+    ------
+    Conflict
+        The port is taken.
+    """
+    listening = _listen(host, port)
+    shown = f"[{host}]" if ":" in host else host
+    url = f"http://{shown}:{listening.getsockname()[1]}"
+    config = uvicorn.Config(
+        create_app(lab_settings), log_config=None, timeout_graceful_shutdown=_GRACE_S, access_log=False
+    )
+    _Announcing(config, lambda: ready(url)).run(sockets=[listening])
+
+
+class _Announcing(uvicorn.Server):
+    """Tells when it answers, and not before."""
+
+    def __init__(self, config: uvicorn.Config, ready: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._ready = ready
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Start, then tell."""
+        await super().startup(sockets)
+        if self.started:
+            self._ready()
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listening = socket.socket(family, socket.SOCK_STREAM)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind((host, port))
+    except OSError as error:
+        listening.close()
+        raise Conflict(
+            problem(
+                "port-taken",
+                "Port %(port)d of %(host)s cannot be used (%(why)s). Choose another one with --port.",
+                port=port,
+                host=host,
+                why=error.strerror or str(error),
+            )
+        ) from error
+    return listening
