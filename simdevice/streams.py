@@ -1,0 +1,67 @@
+"""Random streams named by what they are for.
+
+A stream's key is (part, what the part is drawn for …) and becomes the spawn key of a
+`numpy.random.SeedSequence`. No stream is ever drawn from twice for two purposes, so a new part, a
+new position, another order or more workers change no number that was there before.
+
+The numbers of `Part` and the bit generator are part of every simulated record: never renumber.
+"""
+
+from enum import IntEnum
+
+import numpy as np
+
+
+class Part(IntEnum):
+    """What a stream is drawn for; the words in brackets are the rest of its key."""
+
+    RATE_WHITE = 1
+    """White rate noise of a record (axis, position, repeat)."""
+    AMMETER_WHITE = 2
+    """White noise of the ammeter in a record (channel, position, repeat)."""
+    MEAN_RATE_WHITE = 3
+    """White rate noise of a mean drawn without its record (axis, position, repeat)."""
+    MEAN_AMMETER_WHITE = 4
+    """White ammeter noise of a mean drawn without its record (channel, position, repeat)."""
+    CERTIFIED_ANGLES = 5
+    """The angles of a drawn certificate (position)."""
+    MISALIGNMENT_COMMON = 6
+    """The certificate's systematic deviation from the truth ()."""
+    MISALIGNMENT = 7
+    """The certificate's random deviation from the truth (position)."""
+    INDIVIDUAL = 8
+    """An individual gyro of a type ()."""
+    START = 9
+    """The scatter of a gyro's parameters from power-up to power-up (number of the start)."""
+    STAND_SEED = 10
+    """The seed of a stand made for a scenario ()."""
+    SESSION_SEED = 11
+    """The seed of one session in a gyro's history (number of the session)."""
+    FLEET_SEED = 12
+    """The seed of one gyro in a fleet (number of the gyro)."""
+
+
+def _sequence(seed: int, part: Part, key: tuple[int, ...]) -> np.random.SeedSequence:
+    if seed < 0:
+        raise ValueError(f"The seed is {seed}: give an integer that is not negative.")
+    return np.random.SeedSequence(seed, spawn_key=(int(part), *key))
+
+
+def stream(seed: int, part: Part, *key: int) -> np.random.Generator:
+    """The generator of one part.
+
+    Parameters
+    ----------
+    seed
+        Not negative, of any size.
+    part
+        What the numbers are for.
+    *key
+        What distinguishes this stream within the part, integers in [0, 2³²).
+    """
+    return np.random.Generator(np.random.PCG64(_sequence(seed, part, key)))
+
+
+def derived_seed(seed: int, part: Part, *key: int) -> int:
+    """A seed of 64 bits for a thing that has streams of its own; arguments as for `stream`."""
+    return int(_sequence(seed, part, key).generate_state(1, np.uint64)[0])
