@@ -48,14 +48,18 @@ class Table:
         return tuple(self.columns)
 
     def texts(self, name: str) -> Iterator[str]:
-        """Iterate over a column's values as text; empty where there is none.
+        """Iterate over a column's values as text; empty where there is none."""
+        return texts_of(self.columns[name])
 
-        A float64 becomes the shortest decimal that reads back as the same bits.
-        """
-        column: Any = self.columns[name]
-        if pa.types.is_floating(column.type):
-            column = pc.cast(column, pa.float64())
-        elif pa.types.is_timestamp(column.type):
-            instants = pc.cast(column, pa.timestamp("us", column.type.tz), safe=False).to_pylist()
-            return ("" if value is None else value.isoformat() for value in instants)
-        return ("" if value is None else str(value) for value in column.to_pylist())
+
+def texts_of(column: Any) -> Iterator[str]:
+    """Values of a column as text; empty where there is none.
+
+    A float64 becomes the shortest decimal that reads back as the same bits.
+    """
+    if pa.types.is_floating(column.type):
+        column = pc.cast(column, pa.float64())
+    elif pa.types.is_timestamp(column.type):
+        instants = pc.cast(column, pa.timestamp("us", column.type.tz), safe=False).to_pylist()
+        return ("" if value is None else value.isoformat() for value in instants)
+    return ("" if value is None else str(value) for value in column.to_pylist())
