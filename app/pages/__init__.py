@@ -1,0 +1,47 @@
+"""Pages for people: one module per noun, handlers that parse, call a service and render.
+
+Addresses: ``/`` today · ``/sessions`` ``/sessions/new`` ``/sessions/{id}`` · ``/results``
+``/results/{id}`` · ``/measurements/{id}`` · ``/gyros`` ``/gyros/{serial}`` (its history)
+``/gyros/{serial}/edit`` · ``/types/{name}`` · ``/stands`` ``/stands/{name}`` · ``/certificates``
+``/certificates/{stand}/{number}`` · ``/simulations/new`` · ``/jobs/{id}`` · ``/method``.
+
+State is in the address: filters, sorting and pages of a list are GET. A form that cannot be used
+comes back with status 422 and what was typed. `mount` puts everything into an application whose
+``app.state.lab`` is a `Lab`; errors are shown by `errors.page`.
+"""
+
+from fastapi import APIRouter, FastAPI
+from fastapi.staticfiles import StaticFiles
+
+from app.pages import (
+    assets,
+    certificates,
+    choices,
+    errors,
+    gyros,
+    jobs,
+    method,
+    sign_in,
+    simulations,
+    stands,
+    today,
+    types,
+)
+from app.pages.base import STATIC, Language
+
+__all__ = ["errors", "mount", "router"]
+
+router = APIRouter(include_in_schema=False)
+for _noun in (
+    today, gyros, types, stands, certificates, simulations, jobs, method, sign_in, choices, assets,
+):  # fmt: skip
+    router.include_router(_noun.router)
+
+
+def mount(app: FastAPI) -> None:
+    """Put the pages, their files and the choice of language into the application."""
+    app.include_router(router)
+    app.mount("/static", StaticFiles(directory=STATIC), name="static")
+    # The package is only looked up, never imported: it would want Django.
+    app.mount("/lib/htmx", StaticFiles(packages=[("django_htmx", "static/django_htmx")]), name="htmx")
+    app.add_middleware(Language)

@@ -1,0 +1,117 @@
+import shutil
+import warnings
+from collections.abc import Iterator
+from datetime import date, timedelta
+from pathlib import Path
+
+import pytest
+from fastapi import FastAPI
+from fastapi.exceptions import RequestValidationError
+from sqlalchemy.orm import Session
+from starlette.exceptions import HTTPException, StarletteDeprecationWarning
+
+from app import pages
+from app.errors import AppError
+from app.exchange.rows import CertificateRow
+from app.services import access, gyros, stands
+from app.services.lab import Lab
+from app.settings import Settings
+from app.store.database import Database
+from app.store.migrate import upgrade
+from app.store.records import RecordFiles
+
+with warnings.catch_warnings():
+    # Starlette's client would rather have a successor of httpx; ours is the one the product itself uses.
+    warnings.simplefilter("ignore", StarletteDeprecationWarning)
+    from fastapi.testclient import TestClient
+
+PASSWORD = "correct horse battery"
+GRID = [(theta, psi) for theta in (0.0, 90.0, 180.0, 270.0) for psi in (0.0, 90.0, 180.0, 270.0)]
+
+
+class Notebook:
+    """Stands for the job engine: notes what it is asked for."""
+
+    def __init__(self) -> None:
+        self.queued: list[str] = []
+        self.cancelled: list[str] = []
+
+    def enqueue(self, session: Session, job_id: str, *, priority: int = 100) -> None:
+        self.queued.append(job_id)
+
+    def cancel(self, job_id: str) -> None:
+        self.cancelled.append(job_id)
+
+
+@pytest.fixture
+def queue() -> Notebook:
+    return Notebook()
+
+
+@pytest.fixture(scope="session")
+def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A database with its tables and two accounts, to be copied: hashing a password is slow on purpose."""
+    settings = Settings(data=tmp_path_factory.mktemp("prepared"))
+    database = Database(settings.url)
+    upgrade(database)
+    with Lab(settings, database, RecordFiles(settings.records), Notebook()).write(access.SYSTEM) as work:
+        access.add_account(work, "irina", "technician", PASSWORD, "I. Petrova")
+        access.add_account(work, "dmitri", "designer", None, "D. Ivanov")
+    database.close()
+    return settings.data / "driftbook.sqlite"
+
+
+@pytest.fixture
+def lab(tmp_path: Path, queue: Notebook, prepared: Path) -> Iterator[Lab]:
+    settings = Settings(data=tmp_path)
+    shutil.copy(prepared, tmp_path)
+    database = Database(settings.url)
+    yield Lab(settings, database, RecordFiles(settings.records), queue)
+    database.close()
+
+
+@pytest.fixture
+def application(lab: Lab) -> FastAPI:
+    app = FastAPI(openapi_url=None)
+    app.state.lab = lab
+    for kind in (AppError, RequestValidationError, HTTPException, Exception):
+        app.add_exception_handler(kind, pages.errors.page)
+    pages.mount(app)
+    return app
+
+
+@pytest.fixture
+def anonymous(application: FastAPI) -> TestClient:
+    return TestClient(application, follow_redirects=False, raise_server_exceptions=False)
+
+
+def _signed_in(application: FastAPI, lab: Lab, name: str) -> TestClient:
+    client = TestClient(application, follow_redirects=False, raise_server_exceptions=False)
+    with lab.write(access.SYSTEM) as work:
+        secret = access.make_sign_in_link(work, name, timedelta(minutes=5))
+    assert client.get(f"/sign-in/link/{secret}").status_code == 303
+    return client
+
+
+@pytest.fixture
+def technician(application: FastAPI, lab: Lab) -> TestClient:
+    """May read and upload."""
+    return _signed_in(application, lab, "irina")
+
+
+@pytest.fixture
+def designer(application: FastAPI, lab: Lab) -> TestClient:
+    """May only read."""
+    return _signed_in(application, lab, "dmitri")
+
+
+@pytest.fixture
+def stocked(lab: Lab) -> Lab:
+    """A laboratory with a gyro, its type's limits, a stand and its certificate."""
+    with lab.write(access.SYSTEM) as work:
+        gyros.set_limits(work, "GVK-6", {"w0x": (-2.0, 2.0), "w0y": (-0.8, 0.8)})
+        gyros.add_gyro(work, "0417", "GVK-6", "first of the series")
+        stands.add_stand(work, "S1", 55.7558, "room 12")
+        rows = [CertificateRow(theta, psi, 6.9, -16.4, 6.6) for theta, psi in GRID]
+        stands.add_certificate(work, "S1", "C-17", date(2020, 1, 1), date(2100, 1, 1), rows, "Metrology")
+    return lab
