@@ -121,22 +121,23 @@ def _measure(work: Work, visit: _Visit, stand: Stand, rows: Sequence[Certificate
             temperature_c=round(21.5 + np.sin(visit.time / (60 * DAY)), 1), truth=truth_lab(bench.gyro),
         ),
     )  # fmt: skip
-    if visit.last:
-        _keep_records(work, session.id, bench)
-    else:
-        for row in _means(bench, visit.at):
-            ingest.save_means(work, session.id, row, ingest.Source("simulation"))
+    ingest.save(work, session.id, _kept(work, bench) if visit.last else _means_only(bench, visit.at))
     _solve(work, session.id, rows)
 
 
-def _keep_records(work: Work, session_id: int, bench: Bench) -> None:
+def _means_only(bench: Bench, at: datetime) -> list[ingest.Measured]:
+    return [ingest.Measured(row, ingest.Source("simulation")) for row in _means(bench, at)]
+
+
+def _kept(work: Work, bench: Bench) -> list[ingest.Measured]:
+    measured = []
     for item in run_session(bench, sixteen_positions()).positions:
         record = _record(item)
-        content = write_record_parquet(record)
-        digest = work.files.put(content, "parquet")
+        digest = work.files.put(write_record_parquet(record), "parquet")
         row = means_row(record)
         stored = ingest.StoredRecord(digest, len(item.t), row.duration_s or 0.0, row.rate_hz or 0.0)
-        ingest.save_record(work, session_id, row, stored, ingest.Source("simulation", digest))
+        measured.append(ingest.Measured(row, ingest.Source("simulation", digest), stored))
+    return measured
 
 
 def _record(item: SimulatedPosition) -> CurrentRecord:

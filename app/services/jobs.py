@@ -37,6 +37,11 @@ def active(work: Work) -> tuple[JobView, ...]:
     return tuple(job_view(row) for row in results.active_jobs(work.db))
 
 
+def counts(work: Work) -> Mapping[str, int]:
+    """How many jobs there are in each state."""
+    return results.job_counts(work.db)
+
+
 def cancel(work: Work, job_id: str) -> JobView:
     """Cancel a job that has not ended; one that has ended stays as it is."""
     row = _find(work, job_id)

@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from app.errors import Invalid, problem
-from app.exchange.rows import MeansRow
 from app.services import calibrations, ingest, jobs, stands
 from app.services.calibrations import METHODS
 from app.services.lab import Work
@@ -81,10 +80,13 @@ def prepare(work: Work, session_id: int, wanted: Mapping[str, Any]) -> dict[str,
 def store(work: Work, session_id: int, wanted: Mapping[str, Any], output: Mapping[str, Any]) -> int:
     """Keep records, means, truth and result."""
     find_session(work, session_id).truth = output["truth"]
-    for item in output["measured"]:
-        ingest.save_record(
-            work, session_id, MeansRow(**item["means"]), ingest.StoredRecord(**item["record"]),
-            ingest.Source("simulation", item["record"]["digest"]),
-        )  # fmt: skip
+    ingest.save(
+        work,
+        session_id,
+        [
+            ingest.measured_item(item, ingest.Source("simulation", item["record"]["digest"]))
+            for item in output["measured"]
+        ],
+    )
     inputs = [row.id for row in measurement.current(work.db, session_id)]
     return calibrations.store(work, session_id, {"method": wanted["method"], "inputs": inputs}, output)

@@ -32,7 +32,10 @@ def gyro_type(db: Session, name: str) -> GyroType | None:
 def types_with_counts(db: Session) -> Sequence[tuple[GyroType, int]]:
     """Every type with the number of its gyros."""
     counted = (
-        sa.select(GyroType, sa.func.count(Gyro.id)).outerjoin(Gyro).group_by(GyroType.id).order_by(GyroType.name)
+        sa.select(GyroType, sa.func.count(Gyro.id))
+        .outerjoin(Gyro)
+        .group_by(GyroType.id)
+        .order_by(GyroType.name)
     )
     return [(kind, count) for kind, count in db.execute(counted)]
 

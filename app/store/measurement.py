@@ -48,10 +48,14 @@ def revisions(db: Session, session_id: int) -> Sequence[Measurement]:
     ).all()
 
 
+def newest(db: Session, session_id: int) -> dict[tuple[float, float, int], Measurement]:
+    """The highest revision of each position and repeat, by (theta_deg, psi_deg, repeat) and in that order."""
+    return {(row.theta_deg, row.psi_deg, row.repeat): row for row in revisions(db, session_id)}
+
+
 def current(db: Session, session_id: int) -> Sequence[Measurement]:
     """What counts: of each position and repeat the highest revision, unless it was withdrawn."""
-    newest = {(row.theta_deg, row.psi_deg, row.repeat): row for row in revisions(db, session_id)}
-    return [row for row in newest.values() if row.jx_ma is not None]
+    return [row for row in newest(db, session_id).values() if row.jx_ma is not None]
 
 
 def last_revision(
@@ -102,3 +106,8 @@ def measured_positions(db: Session, session_ids: Sequence[int]) -> Mapping[int, 
 def record(db: Session, digest: str) -> Record | None:
     """What is known of a record file."""
     return db.get(Record, digest)
+
+
+def known_records(db: Session, digests: Sequence[str]) -> frozenset[str]:
+    """Which of these record files are known."""
+    return frozenset(db.scalars(sa.select(Record.digest).where(Record.digest.in_(digests))))

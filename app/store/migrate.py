@@ -11,6 +11,8 @@ from pathlib import Path
 import sqlalchemy as sa
 from alembic import command
 from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
 
 from app.store.database import Database
 from app.store.tables import Base
@@ -27,6 +29,13 @@ def upgrade(database: Database) -> None:
     """Apply every migration that the database lacks, in one transaction."""
     with database.engine.execution_options(writing=True).begin() as connection:
         command.upgrade(_config(connection), "head")
+
+
+def is_current(database: Database) -> bool:
+    """Whether the database has every migration that this program knows, and none beyond."""
+    with database.engine.begin() as connection:
+        applied = MigrationContext.configure(connection).get_current_heads()
+        return set(applied) == set(ScriptDirectory.from_config(_config(connection)).get_heads())
 
 
 def _config(connection: sa.Connection) -> Config:

@@ -35,6 +35,11 @@ def active_jobs(db: Session) -> Sequence[Job]:
     return db.scalars(sa.select(Job).where(Job.state.in_(ACTIVE)).order_by(Job.created_at)).all()
 
 
+def job_counts(db: Session) -> Mapping[str, int]:
+    """How many jobs there are in each state."""
+    return {row[0]: row[1] for row in db.execute(sa.select(Job.state, sa.func.count()).group_by(Job.state))}
+
+
 def calibration(db: Session, calibration_id: int) -> Calibration | None:
     """The calibration of that number."""
     return db.get(Calibration, calibration_id)
