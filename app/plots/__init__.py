@@ -1,0 +1,34 @@
+"""Chart specifications: plain values in, a Vega-Lite document out, drawn in the page or printed.
+
+A chart is written once in Altair with named, empty data; what Altair makes of it is kept, and a
+request only fills in rows, domains and words (`template.filled`). So Altair is imported when the
+first chart is asked for (`warm_up` does it beforehand), and a chart costs well under a millisecond.
+
+Colours are the stylesheet's variables: the page that shows a chart decides between light and dark,
+and a change of theme needs no redrawing. `theme.printed` puts the light or dark values in for paper.
+"""
+
+from app.plots.convergence import Change, convergence
+from app.plots.drift import DriftEvent, DriftLimit, DriftPoint, drift
+from app.plots.record import Stretch, record
+from app.plots.residuals import LIMIT_SD, Place, Residual, decade, residuals
+from app.plots.template import warm_up
+from app.plots.theme import printed
+
+__all__ = [
+    "LIMIT_SD",
+    "Change",
+    "DriftEvent",
+    "DriftLimit",
+    "DriftPoint",
+    "Place",
+    "Residual",
+    "Stretch",
+    "convergence",
+    "decade",
+    "drift",
+    "printed",
+    "record",
+    "residuals",
+    "warm_up",
+]

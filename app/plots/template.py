@@ -1,0 +1,82 @@
+"""From an Altair chart, written once, to the document of one request."""
+
+import threading
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from app.plots import theme
+from app.plots.theme import Spec
+
+Row = Mapping[str, Any]
+
+
+def template_of(chart: Any) -> Spec:
+    """What Altair makes of a chart with named data, checked by it against Vega-Lite's schema.
+
+    Charts fill the width of their container and keep the size of their text.
+    """
+    spec: Spec = chart.properties(
+        width="container", autosize={"type": "fit-x", "contains": "padding"}, padding=0
+    ).to_dict()
+    spec.pop("config", None)
+    return spec
+
+
+def filled(
+    template: Spec,
+    *,
+    data: Mapping[str, Iterable[Row]],
+    values: Mapping[str, Any],
+    description: str,
+    height: int | None = None,
+) -> Spec:
+    """The document of one request.
+
+    Parameters
+    ----------
+    template
+        From `template_of`; it is not changed.
+    data
+        Rows of each named data set.
+    values
+        Values of the chart's parameters.
+    description
+        What the chart shows, for whoever does not see it.
+    height
+        Height in px, where it is not the template's.
+    """
+    known = [item["name"] for item in template.get("params", ())]
+    unknown = set(values) - set(known)
+    if unknown:
+        raise ValueError(f"the chart has no parameter {', '.join(sorted(unknown))}")
+    params = [
+        {**item, "value": values[item["name"]]} if item["name"] in values else item
+        for item in template.get("params", ())
+    ]
+    return {
+        **template,
+        **({"height": height} if height else {}),
+        "description": description,
+        "config": theme.config(),
+        "params": params,
+        "datasets": {name: [dict(row) for row in rows] for name, rows in data.items()},
+    }
+
+
+def warm_up() -> None:
+    """Import Altair in the background, so that nobody waits for it."""
+    threading.Thread(target=_import, name="charts", daemon=True).start()
+
+
+def _import() -> None:
+    import altair  # noqa: F401
+
+
+def axis_range(values: Iterable[float], *, margin: float = 0.08) -> tuple[float, float]:
+    """Lowest and highest value with a margin on both sides; of one value alone, a range around it."""
+    found = sorted(values)
+    if not found:
+        return -1.0, 1.0
+    low, high = found[0], found[-1]
+    span = (high - low) or abs(high) * 0.01 or 1.0
+    return low - margin * span, high + margin * span
