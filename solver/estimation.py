@@ -37,30 +37,39 @@ class Noise:
         Where it comes from.
     covariance : (2n, 2n) array
         R, (rad/s)²; NaN when it is not known.
+    rest : (2n,) array
+        Part of the residuals that no parameters explain, whitened when the basis is ``given``.
     """
 
     basis: UncertaintyBasis
     covariance: Array
+    rest: Array
 
 
 def least_squares_estimate(equations: Equations) -> Estimate:
     """Least squares over every position, weighted by u(J) where it is given."""
     invisible = find_invisible(equations)
-    scale = natural_scale(equations.design)
-    solution = solve(equations.design, equations.right_side, scale=scale, invisible=invisible.directions)
-    whitening = None
+    design, right_side, whitening = equations.design, equations.right_side, None
     if equations.u_currents is not None:
         for _ in range(REWEIGHTING_ROUNDS):
-            whitening = _whitening(solution.values, equations.u_currents)
-            if whitening is None:
+            latest = _whitening(_rough(design, right_side, invisible), equations.u_currents)
+            if latest is None:
                 break
-            design, right_side = (
-                _whiten(whitening, equations.design),
-                _whiten(whitening, equations.right_side),
-            )
-            solution = solve(design, right_side, scale=natural_scale(design), invisible=invisible.directions)
+            whitening = latest
+            design = _whiten(whitening, equations.design)
+            right_side = _whiten(whitening, equations.right_side)
+    solution = solve(design, right_side, scale=natural_scale(design), invisible=invisible.directions)
     gain = solution.gain if whitening is None else _whiten(whitening, solution.gain.T, transpose=True).T
     return _estimate("least-squares", equations, solution.values, gain, solution, invisible, None)
+
+
+def _rough(design: Array, right_side: Array, invisible: Invisible) -> Array:
+    """Parameters good enough to weight by, (8,): normal equations where nothing is invisible."""
+    scale = natural_scale(design)
+    if len(invisible.directions):
+        return solve(design, right_side, scale=scale, invisible=invisible.directions).values
+    scaled = design / scale
+    return np.asarray(np.linalg.solve(scaled.T @ scaled, scaled.T @ right_side) / scale)
 
 
 def paper_estimate(equations: Equations, observations: Observations) -> Estimate:
@@ -110,33 +119,33 @@ def _whiten(whitening: Array, rows: Array, *, transpose: bool = False) -> Array:
     return np.asarray((blocks @ rows.reshape(len(blocks), 2, -1)).reshape(rows.shape))
 
 
-def _noise(
-    equations: Equations, values: Array, residuals: Array, invisible: Invisible
-) -> tuple[Noise, Array, int]:
-    """Noise of the rates, the whitened residuals that no parameters explain, degrees of freedom."""
+def _noise(equations: Equations, values: Array, residuals: Array, dof: int, invisible: Invisible) -> Noise:
+    """Noise of the rates, from u(J) or from the part of the residuals that no parameters explain."""
     n = len(residuals) // 2
-    dof = 2 * n - (8 - len(invisible.directions))
-    whitening = None if equations.u_currents is None else _whitening(values, equations.u_currents)
     if invisible.parameters[:4].any():  # the rates' noise is K times that of the currents
-        unknown = np.full((2 * n, 2 * n), np.nan)
-        return Noise("none", unknown), residuals, dof
-    basis: UncertaintyBasis = "scatter" if dof > 0 else "none"
-    if whitening is None:
-        whitening = np.broadcast_to(np.eye(2), (n, 2, 2))
-    else:
-        basis = "given"
-    design = _whiten(whitening, equations.design)
-    rest = _whiten(whitening, residuals)
-    rest = (
-        rest
-        - design @ solve(design, rest, scale=natural_scale(design), invisible=invisible.directions).values
-    )
-    blocks = np.zeros((n, 2, n, 2))
-    if equations.u_currents is not None and basis == "given":
-        blocks[np.arange(n), :, np.arange(n), :] = rate_covariance(values, equations.u_currents)
-        return Noise(basis, blocks.reshape(2 * n, 2 * n)), rest, dof
+        return Noise("none", np.full((2 * n, 2 * n), np.nan), residuals)
+    if equations.u_currents is not None:
+        whitening = _whitening(values, equations.u_currents)
+        if whitening is None:
+            return Noise("none", np.full((2 * n, 2 * n), np.nan), residuals)
+        rest = _inexplicable(_whiten(whitening, equations.design), _whiten(whitening, residuals), invisible)
+        return Noise("given", _blocks(values, equations.u_currents), rest)
+    rest = _inexplicable(equations.design, residuals, invisible)
     variance = float(rest @ rest) / dof if dof > 0 else np.nan
-    return Noise(basis, variance * np.eye(2 * n)), rest, dof
+    return Noise("scatter" if dof > 0 else "none", variance * np.eye(2 * n), rest)
+
+
+def _blocks(values: Array, u_currents: Array) -> Array:
+    """K·ΣJ·Kᵀ of every position on the diagonal, (2n, 2n)."""
+    n = len(u_currents)
+    blocks = np.zeros((n, 2, n, 2))
+    blocks[np.arange(n), :, np.arange(n), :] = rate_covariance(values, u_currents)
+    return blocks.reshape(2 * n, 2 * n)
+
+
+def _inexplicable(design: Array, residuals: Array, invisible: Invisible) -> Array:
+    """Part of the residuals that no change of the parameters removes; all of it after least squares."""
+    return residuals - design @ _rough(design, residuals, invisible)
 
 
 def _estimate(
@@ -149,20 +158,24 @@ def _estimate(
     history: Array | None,
 ) -> Estimate:
     residuals = equations.residuals(values)
-    noise, rest, dof = _noise(equations, values, residuals, invisible)
+    dof = len(residuals) - 8 + len(invisible.directions)
+    noise = _noise(equations, values, residuals, dof, invisible)
     covariance = gain @ noise.covariance @ gain.T
     covariance = (covariance + covariance.T) / 2
     standardised = np.full(len(residuals), np.nan)
     outliers = np.zeros(len(residuals), dtype=np.bool_)
-    if noise.basis == "given" or (noise.basis == "scatter" and not _only_rounding(rest, equations)):
+    if noise.basis == "given" or (noise.basis == "scatter" and not _only_rounding(noise.rest, equations)):
         sensitivity = np.eye(len(residuals)) - equations.design @ gain
         freedom = None if noise.basis == "given" else dof
         judged = judge(residuals, sensitivity, noise.covariance, freedom)
         standardised, outliers = judged.standardised, judged.outliers
-    blank, rank, warnings = _undetermined(invisible, covariance)
+    judged_by = covariance
+    if noise.basis == "none":
+        judged_by = gain @ _blocks(values, invisible.noise) @ gain.T
+    blank, rank, warnings = _undetermined(invisible, judged_by)
     values = np.where(blank, np.nan, values)
     covariance[blank] = covariance[:, blank] = np.nan
-    chi2 = float(rest @ rest) if noise.basis == "given" else None
+    chi2 = float(noise.rest @ noise.rest) if noise.basis == "given" else None
     return Estimate(
         method=method,
         values=values,

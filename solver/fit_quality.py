@@ -60,7 +60,7 @@ def judge(residuals: Array, sensitivity: Array, noise: Array, dof: int | None) -
         outliers[worst] = True
         weight = influence[worst, worst]
         if dof is not None and freedom is not None and freedom > 1:
-            noise = noise * ((freedom - size[worst] ** 2) / (freedom - 1))
+            noise = noise * (max(0.0, freedom - size[worst] ** 2) / (freedom - 1))
         rest = rest - influence[:, worst] * (rest[worst] / weight)
         influence = influence - np.outer(influence[:, worst], influence[worst]) / weight
         current = _standardise(rest, influence, noise)

@@ -4,12 +4,15 @@
 decomposition of the column-scaled design: it gives the estimate, the covariance and the *gain*
 ``H`` with ``values = H @ right_side``, whose product with the noise is the estimate's error.
 
-`solve_batch` takes many problems. With columns scaled to unit length, R the Cholesky factor of the
-scaled normal matrix and C = (RᵀR)⁻¹, the squared condition number is at most p·tr C, and every
-standard uncertainty is at least 1 in scaled units. One step of iterative refinement with the true
-residual leaves an error of about (ε·κ²)²·‖q‖ + ε·κ·‖q‖ (Björck, Numerical Methods for Least Squares
-Problems, 1996, sec. 2.9: corrected normal equations), which is compared with 1e-9; where it is not
-below that, the problem is solved again by an orthogonal factorisation.
+`solve_batch` takes many problems. With columns scaled to unit length, G is the normal matrix and
+C = G⁻¹ the covariance in scaled parameters; the squared condition number of the design, κ², is at
+most p·tr C. G is inverted in place by symmetric elimination on its Cholesky pivots (sweep operator),
+all problems of a block at once. The normal equations lose about ε·κ²·‖q‖ of the scaled answer q; so
+they are solved only for the difference from the first problem's answer, which problems of one batch
+mostly share, with residuals from the design itself (as in iterative refinement). What remains,
+ε·κ²·‖difference‖ + ε·κ·‖q‖, is compared with the smallest standard uncertainty, which in scaled
+parameters is at least 1: where it is not below 1e-9, the step is repeated, and if that does not
+help the problem is solved by an orthogonal factorisation.
 """
 
 from dataclasses import dataclass
@@ -23,7 +26,9 @@ AGREEMENT: Final = 1e-9
 """Largest difference between the fast and the orthogonal solution of a batch, in units of u."""
 _SAFETY: Final = 10.0
 _EPS: Final = float(np.finfo(np.float64).eps)
-_BLOCK_BYTES: Final = 1 << 19
+_BLOCK: Final = 256
+"""Problems worked on at once: their 8×8 matrices fit the second-level cache."""
+_DEFICIENT: Final = "a design has not full column rank"
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,53 +133,79 @@ def solve_batch(design: Array, right_side: Array) -> tuple[Array, Array]:
         When a design has not full column rank.
     """
     if design.ndim == 2:
-        shared: Array = _orthogonal(design[None], np.zeros((1, len(design))))[1][0]
-        gain = shared @ design.T
-        values: Array = np.atleast_2d(right_side) @ gain.T
-        values += (np.atleast_2d(right_side) - values @ design.T) @ gain.T
-        return values, np.broadcast_to(shared, (len(values), *shared.shape))
+        return _solve_shared(design, np.atleast_2d(right_side))
     count, rows, columns = design.shape
     values = np.empty((count, columns))
     covariance = np.empty((count, columns, columns))
+    if not count:
+        return values, covariance
     right_side = np.broadcast_to(right_side, (count, rows))
-    block = max(1, _BLOCK_BYTES // (8 * rows * columns))
-    for start in range(0, count, block):
-        part = slice(start, start + block)
-        values[part], covariance[part] = _solve_block(design[part], right_side[part])
+    start = _orthogonal(design[:1], right_side[:1])[0][0]
+    for first in range(0, count, _BLOCK):
+        part = slice(first, first + _BLOCK)
+        _solve_block(design[part], right_side[part], start, values[part], covariance[part])
     return values, covariance
 
 
-def _solve_block(design: Array, right_side: Array) -> tuple[Array, Array]:
-    transposed = design.transpose(0, 2, 1)
-    normal = transposed @ design
-    scale: Array = np.sqrt(np.einsum("nii->ni", normal))
-    normal /= scale[:, :, None] * scale[:, None, :]
-    try:
-        covariance = np.asarray(np.linalg.inv(normal), np.float64)
-    except np.linalg.LinAlgError:
-        return _orthogonal(design, right_side)
-    values: Array = np.zeros(scale.shape)
-    rest = right_side
-    for _ in range(2):
-        slope = (transposed @ rest[:, :, None])[:, :, 0] / scale
-        values += (covariance @ slope[:, :, None])[:, :, 0] / scale
-        rest = right_side - (design @ values[:, :, None])[:, :, 0]
-    length = np.sqrt(np.einsum("ni,ni->n", values * scale, values * scale))
-    kappa_squared = scale.shape[1] * np.einsum("nii->n", covariance)
-    first = _SAFETY * _EPS * kappa_squared
-    doubtful = ~((first**2 + _SAFETY * _EPS * np.sqrt(np.abs(kappa_squared))) * length < AGREEMENT)
-    covariance /= scale[:, :, None] * scale[:, None, :]
+def _solve_shared(design: Array, right_sides: Array) -> tuple[Array, Array]:
+    single = solve(design, right_sides[0])
+    if not single.singular_values[-1] > len(design) * _EPS * single.singular_values[0]:
+        raise np.linalg.LinAlgError(_DEFICIENT)
+    values: Array = right_sides @ single.gain.T
+    return values, np.broadcast_to(single.covariance, (len(values), *single.covariance.shape))
+
+
+def _solve_block(design: Array, right_side: Array, start: Array, values: Array, covariance: Array) -> None:
+    """Solve one block into `values` and `covariance`, beginning from `start` (p,)."""
+    normal = np.ascontiguousarray((design.transpose(0, 2, 1) @ design).transpose(1, 2, 0))
+    with np.errstate(divide="ignore", invalid="ignore"):  # a column of zeros: doubtful below
+        unscale = 1.0 / np.sqrt(np.einsum("iib->ib", normal))
+        normal *= unscale[:, None] * unscale
+        _invert(normal)
+    rest = right_side - design @ start
+    answer = np.repeat(start[:, None], len(design), axis=1)
+    kappa = np.sqrt(np.abs(len(start) * np.einsum("iib->b", normal)))
+    for last in (False, True):
+        difference = np.einsum("ijb,jb->ib", normal, np.vecmat(rest, design).T * unscale)
+        answer += difference * unscale
+        error = _SAFETY * _EPS * kappa * (kappa * _length(difference) + _length(answer / unscale))
+        doubtful = ~(error < AGREEMENT)  # true for NaN
+        if last or not doubtful.any():
+            break
+        rest = right_side - np.matvec(design, answer.T)
+    normal *= unscale[:, None] * unscale
+    values[:] = answer.T
+    covariance[:] = normal.transpose(2, 0, 1)
     if doubtful.any():
         values[doubtful], covariance[doubtful] = _orthogonal(design[doubtful], right_side[doubtful])
-    return values, covariance
+
+
+def _length(vectors: Array) -> Array:
+    return np.asarray(np.sqrt(np.einsum("ib,ib->b", vectors, vectors)))
+
+
+def _invert(stack: Array) -> None:
+    """Invert symmetric positive definite matrices, (p, p, B), in place."""
+    product = np.empty_like(stack)
+    for k in range(len(stack)):
+        pivot = stack[k, k].copy()
+        row = stack[k].copy()
+        column = row / pivot
+        np.multiply(row[:, None], column, out=product)
+        stack -= product
+        stack[k] = stack[:, k] = column
+        np.divide(-1.0, pivot, out=stack[k, k])
+    np.negative(stack, out=stack)
 
 
 def _orthogonal(design: Array, right_side: Array) -> tuple[Array, Array]:
     """Solve by QR of the scaled columns, (N, m, p)."""
     scale = np.sqrt(np.einsum("nmp,nmp->np", design, design))
-    if not scale.all():
-        raise np.linalg.LinAlgError("a column of the design is zero")
+    if not scale.all() or design.shape[1] < design.shape[2]:
+        raise np.linalg.LinAlgError(_DEFICIENT)
     q, r = np.linalg.qr(design / scale[:, None, :])
+    if np.abs(np.einsum("nii->ni", r)).min(initial=1.0) <= design.shape[1] * _EPS:
+        raise np.linalg.LinAlgError(_DEFICIENT)
     root: Array = np.linalg.inv(r) / scale[:, :, None]
-    values: Array = (root @ (q.transpose(0, 2, 1) @ right_side[:, :, None]))[:, :, 0]
+    values: Array = np.matvec(root, np.vecmat(right_side, q))
     return values, root @ root.transpose(0, 2, 1)

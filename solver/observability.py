@@ -14,15 +14,17 @@ generalised eigenvalues of (XᵀX, D), as in tests of identification with errors
 
 Noise in the design also shrinks least squares along v, by about (m − p)/(m·s²) of the value over m
 equations and p parameters, with a standard uncertainty of about 1/(s·√m) of it. A direction counts
-as visible only when the shrinkage is neither above 4 % nor above that uncertainty:
-s ≥ max(5, (m − p)/√m). Ordinary sessions have s of several hundred.
+as visible only when the shrinkage is neither above 2 % nor above two thirds of that uncertainty:
+s ≥ max(7, 1.5·(m − p)/√m). Ordinary sessions have s of several hundred.
 
 Without u(J) the noise of the currents follows from the scatter of the residuals, which is K times
 it. When nothing is visible, m·s² is then distributed as F with 1 and m − p degrees of freedom, far
-below its threshold 25·m. Where the right side vanishes with Z (exactly at a pole) so does every
-residual, and the smallest singular value itself is the noise.
+below its threshold 49·m. Where the right side vanishes with Z (exactly at a pole) so does every
+residual, and the smallest singular value itself is the noise. Where no residual is left over to
+show any scatter, the noise is taken as 1e-3 of the currents.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -38,8 +40,12 @@ from solver.units import (
     rad_per_s_from_deg_per_h,
 )
 
-CLEAR_OF_NOISE: Final = 5.0
+CLEAR_OF_NOISE: Final = 7.0
 """Singular value, in units of what noise alone gives, from which on a direction is visible."""
+_SHRUNK_BY_U: Final = 1.5
+_UNTOLD_NOISE: Final = 1e-3
+_ABSOLUTE_ROUNDS: Final = 30
+_MEDIAN_OF_NORMAL: Final = 0.6745
 _ROUNDING: Final = 1e-10
 _NO_PART: Final = 1e-8
 _MENTIONED: Final = 1e-3
@@ -60,11 +66,14 @@ class Invisible:
         The same, each part as its effect on the rates relative to the largest.
     parameters : (8,) bool array
         Parameters with a part in one of them.
+    noise : (n, 2) array
+        Noise of Jx and Jy by which this was judged, A; zero where only rounding is known.
     """
 
     directions: Array
     shares: Array
     parameters: NDArray[np.bool_]
+    noise: Array
 
 
 def natural_scale(design: Array) -> Array:
@@ -90,9 +99,9 @@ def find_invisible(equations: Equations, rows: Array | None = None) -> Invisible
         Combinations of the equations that the method uses; all equations when not given.
     """
     scale = natural_scale(equations.design)
-    noise = equations.u_currents
+    noise, robust = equations.u_currents, None
     if noise is None:
-        noise = _scatter_of_currents(equations, scale)
+        noise, robust = _scatter_of_currents(equations, scale)
     basis = None if rows is None else np.linalg.qr(rows.T)[0]
     scaled, target = equations.design / scale, equations.right_side
     if basis is not None:
@@ -101,11 +110,14 @@ def find_invisible(equations: Equations, rows: Array | None = None) -> Invisible
     hidden = np.zeros((len(hidden_angles), 8))
     hidden[:, 4:] = hidden_angles
     in_currents = _hidden_currents(currents, noise, basis, scale)
+    if robust is not None and len(in_currents):
+        noise = robust()
+        in_currents = _hidden_currents(currents, noise, basis, scale)
     completed = np.hstack((in_currents, -in_currents @ (pseudo_inverse @ scaled[:, :4]).T))
     shares = _sparse(np.concatenate((completed, hidden)))
     part = np.sqrt(np.sum(shares**2, axis=0)) > _NO_PART
     one = float(rad_per_s_from_deg_per_h(1.0)) * np.sqrt(len(equations.design) / 2)
-    return Invisible(shares * (one / scale), shares, part)
+    return Invisible(shares * (one / scale), shares, part, noise)
 
 
 def _project(scaled: Array, target: Array) -> tuple[Array, Array, Array, Array]:
@@ -114,30 +126,37 @@ def _project(scaled: Array, target: Array) -> tuple[Array, Array, Array, Array]:
     Returns directions of ω (k, 4) that vanish, the pseudo-inverse of the angles' columns (4, m),
     and the columns of currents (m, 4) and the right side (m,) with the angles' part removed.
     """
-    u, s, vh = np.linalg.svd(scaled[:, 4:])
-    padded = np.zeros(4)
-    padded[: len(s)] = s
-    seen = padded > _ROUNDING
-    u = u[:, : len(s)][:, seen[: len(s)]]
-    pseudo_inverse = (vh[seen].T / padded[seen]) @ u.T
+    q, r = np.linalg.qr(scaled[:, 4:])
+    u, s, vh = _small_svd(r)
+    seen = s > _ROUNDING
+    u = q @ u[: len(r), seen]
+    pseudo_inverse = (vh[seen].T / s[seen]) @ u.T
     currents = scaled[:, :4] - u @ (u.T @ scaled[:, :4])
     return vh[~seen], pseudo_inverse, currents, target - u @ (u.T @ target)
 
 
-def _hidden_currents(currents: Array, noise: Array | None, basis: Array | None, scale: Array) -> Array:
+def _triangle(columns: Array) -> Array:
+    return np.asarray(np.linalg.qr(columns, mode="r"))
+
+
+def _small_svd(triangle: Array) -> tuple[Array, Array, Array]:
+    """U, s, Vᵀ of a (k, 4) array with k ≤ 4, padded by rows of zeros to (4, 4)."""
+    padded = np.zeros((4, 4))
+    padded[: len(triangle)] = triangle
+    u, s, vh = np.linalg.svd(padded)
+    return u, s, vh
+
+
+def _hidden_currents(currents: Array, noise: Array, basis: Array | None, scale: Array) -> Array:
     """Directions of the scaled K, (k, 4), whose currents do not stand out from noise or rounding."""
-    _, s, w = np.linalg.svd(currents)
-    smallest_first = np.zeros(4)
-    smallest_first[: len(s)] = s
-    rounded = w[smallest_first <= _ROUNDING]
-    if noise is None:
+    _, s, w = _small_svd(_triangle(currents))
+    rounded = w[s <= _ROUNDING]
+    if not noise.any():
         return rounded
     factor = np.linalg.cholesky(_noise_gram(noise, basis)) / scale[:4, None]
-    _, s, w = np.linalg.svd(np.linalg.solve(factor, currents.T).T)
-    in_noise = np.zeros(4)
-    in_noise[: len(s)] = s
+    _, in_noise, w = _small_svd(_triangle(np.asarray(np.linalg.solve(factor, currents.T).T, np.float64)))
     count = len(currents)
-    buried = w[in_noise < max(CLEAR_OF_NOISE, (count - 8) / np.sqrt(count))]
+    buried = w[in_noise < max(CLEAR_OF_NOISE, _SHRUNK_BY_U * (count - 8) / np.sqrt(count))]
     return np.linalg.solve(factor.T, buried.T).T if len(buried) >= len(rounded) else rounded
 
 
@@ -156,22 +175,46 @@ def _noise_gram(noise: Array, basis: Array | None) -> Array:
     return gram
 
 
-def _scatter_of_currents(equations: Equations, scale: Array) -> Array | None:
-    """Noise of the currents, A, (n, 2), that explains the residuals; None where none can be seen."""
+def _scatter_of_currents(equations: Equations, scale: Array) -> tuple[Array, Callable[[], Array] | None]:
+    """Noise of the currents, A, (n, 2), that explains the residuals; zero where none can be seen.
+
+    The second is a slower estimate which a few blunders do not spoil, where there is one: what a
+    blunder hides is not for want of positions.
+    """
     count = len(equations.design)
     _, _, currents, target = _project(equations.design / scale, equations.right_side)
-    freedom = count - len(PARAMETERS)
+
+    def alike(noise: float) -> Array:
+        return np.full((count // 2, 2), noise)
+
     if np.linalg.norm(target) <= _ROUNDING * np.linalg.norm(equations.right_side):
         ampere = currents * scale[:4] / np.sqrt(count / 2)
-        noise = float(np.linalg.svd(ampere, compute_uv=False)[-1])
-    elif freedom > 0:
-        k = np.linalg.lstsq(currents, target)[0]
-        rest = target - currents @ k
-        k = k / scale[:4]
-        noise = float(np.sqrt(2 * (rest @ rest) / freedom / (k @ k)))
-    else:
-        noise = 0.0
-    return np.full((count // 2, 2), noise) if noise > 0 else None
+        return alike(float(np.linalg.svd(ampere, compute_uv=False)[-1])), None
+    freedom = count - len(PARAMETERS)
+    if freedom <= 0:
+        return alike(_UNTOLD_NOISE * float(np.linalg.norm(scale[:2])) / np.sqrt(count)), None
+    scaled_k = np.linalg.lstsq(currents, target)[0]
+    rest = target - currents @ scaled_k
+    rate = float(np.sqrt((rest @ rest) / freedom))
+    return alike(_as_current(rate, scaled_k / scale[:4])), lambda: alike(_robust_scatter(equations, scale))
+
+
+def _as_current(rate: float, k: Array) -> float:
+    return float(rate * np.sqrt(2.0 / (k @ k)))
+
+
+def _robust_scatter(equations: Equations, scale: Array) -> float:
+    """Noise of the currents from the least sum of absolute residuals (iterated weights) and their median."""
+    scaled, right_side = equations.design / scale, equations.right_side
+    weights = np.ones(len(right_side))
+    for _ in range(_ABSOLUTE_ROUNDS):
+        root = np.sqrt(weights)
+        values = np.linalg.lstsq(scaled * root[:, None], right_side * root)[0]
+        size = np.abs(right_side - scaled @ values)
+        weights = 1.0 / np.maximum(size, 1e-3 * np.median(size) + np.finfo(float).tiny)
+        weights /= weights.max()
+    left_over = np.sort(size)[len(PARAMETERS) :]  # eight parameters bring eight residuals to zero
+    return _as_current(float(np.median(left_over)) / _MEDIAN_OF_NORMAL, values[:4] / scale[:4])
 
 
 def _sparse(directions: Array) -> Array:
