@@ -173,11 +173,23 @@ def _column(
         return Column(name, unit, kind.lab_unit)
     values = {"column": name, "choices": _listed([f"{quantity}_{unit}" for unit in _ascii_units(kind)])}
     if unit:
-        template = "The column %(column)s has an unknown unit. Call it one of: %(choices)s."
-        problems.note(Message("unknown-unit", template, values), row=row, column=name)
+        problems.note(
+            Message(
+                "unknown-unit",
+                "The column %(column)s has an unknown unit. Call it one of: %(choices)s.",
+                values,
+            ),
+            row=row,
+            column=name,
+        )
     else:
-        template = "The column %(column)s does not say its unit. Call it one of: %(choices)s."
-        problems.note(Message("no-unit", template, values), row=row, column=name)
+        problems.note(
+            Message(
+                "no-unit", "The column %(column)s does not say its unit. Call it one of: %(choices)s.", values
+            ),
+            row=row,
+            column=name,
+        )
     return None
 
 
@@ -189,8 +201,7 @@ def _wrong_header(names: Sequence[str], required: Sequence[str]) -> Message:
     wanted = ",".join(lab_name(quantity) for quantity in required)
     return Message(
         "wrong-header",
-        "The header names none of the columns needed. Its first line must be like “%(wanted)s”; found are: "
-        "%(found)s.",
+        "The header names none of the columns needed. Write it like “%(wanted)s”; found are: %(found)s.",
         {"wanted": wanted, "found": _listed(names)},
     )
 

@@ -166,7 +166,8 @@ def _agreeing(
                 Message(
                     "position-differs",
                     "This row belongs to θ %(theta)g°, ψ %(psi)g°, but the record was brought for "
-                    "θ %(wanted_theta)g°, ψ %(wanted_psi)g°. Bring it for its own position, or a long file as a whole session.",
+                    "θ %(wanted_theta)g°, ψ %(wanted_psi)g°. Bring it for its own position, "
+                    "or a long file as a whole session.",
                     {"theta": place.theta_deg, "psi": place.psi_deg,
                      "wanted_theta": known.theta_deg, "wanted_psi": known.psi_deg},
                 ),

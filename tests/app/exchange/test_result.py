@@ -96,8 +96,8 @@ def test_residuals_name_their_positions_as_they_were_written_and_in_the_solvers_
     assert (rows[1]["standardised_x"], rows[1]["standardised_y"]) == (0.2, 0.3)
 
 
-def test_every_stand_angle_of_a_hundredth_of_a_degree_comes_back_as_written() -> None:
-    means = [MeansRow(i / 100, 0.0, 0.001, 0.002) for i in range(36000)]
+def test_every_stand_angle_of_a_tenth_of_a_degree_comes_back_as_written() -> None:
+    means = [MeansRow(i / 10, 0.0, 0.001, 0.002) for i in range(3600)]
     certificate = [CertificateRow(row.theta_deg, 0.0, 0.0, 0.0, 0.0) for row in means]
     inputs = observations(means, certificate, 0.0)
     n = len(means)
@@ -109,7 +109,7 @@ def test_every_stand_angle_of_a_hundredth_of_a_degree_comes_back_as_written() ->
     )
     calibration = replace(_calibration(), observations=inputs, least_squares=blank)
     rows = calibration_json(calibration, "least-squares")["residuals"]
-    assert [row["theta_deg"] for row in rows] == [i / 100 for i in range(36000)]
+    assert [row["theta_deg"] for row in rows] == [i / 10 for i in range(3600)]
 
 
 def test_what_is_undetermined_is_null_everywhere() -> None:
