@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
-from scipy.stats import norm
 
 Array = NDArray[np.float64]
 
@@ -137,7 +136,7 @@ def _clipped_moments(mean: float, std: float, limit: float) -> tuple[float, floa
         return mean, std
     low, high = (-limit - mean) / std, (limit - mean) / std
     below, above = ndtr(low), ndtr(-high)
-    density_low, density_high = norm.pdf(low), norm.pdf(high)
+    density_low, density_high = (np.exp(-0.5 * z**2) / np.sqrt(2.0 * np.pi) for z in (low, high))
     inside = 1.0 - below - above
     # Of z = (value − mean)/std, so that the variance is not a difference of large numbers.
     first = density_low - density_high + low * below + high * above

@@ -1,38 +1,82 @@
-"""The command ``driftbook``: one module per group of commands.
+"""The command ``driftbook``: one module per command, loaded when it is asked for.
 
 Exit codes: 0 done, 2 wrong usage or bad input (one line on standard error says what, where and
 what to do), 1 anything else.
 """
 
+import importlib
+import logging
 import sys
+from typing import Final, NoReturn
 
+import structlog
 import typer
+from typer._click.core import Command, Context
+from typer._click.exceptions import ClickException
+from typer.core import TyperGroup
+from typer.main import get_command
 
-from app.cli import accounts, demo, service, simulate, solve, upload
 from app.errors import AppError
 
+_WHERE: Final = {
+    "demo": "demo:demo",
+    "serve": "service:serve",
+    "migrate": "service:migrate",
+    "solve": "solve:solve",
+    "simulate": "simulate:simulate",
+    "upload": "upload:upload",
+    "user": "accounts:users",
+    "token": "accounts:tokens",
+}
+
+
+class _Commands(TyperGroup):
+    """Imports a command's module when the command is used: solving a file loads no web server."""
+
+    def list_commands(self, ctx: Context) -> list[str]:
+        return list(_WHERE)
+
+    def get_command(self, ctx: Context, cmd_name: str) -> Command | None:
+        if cmd_name not in _WHERE:
+            return None
+        module, _, function = _WHERE[cmd_name].partition(":")
+        found = getattr(importlib.import_module(f"app.cli.{module}"), function)
+        if not isinstance(found, typer.Typer):
+            alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+            alone.command(cmd_name)(found)
+            found = alone
+        return get_command(found)
+
+
 commands = typer.Typer(
+    cls=_Commands,
     name="driftbook",
-    help="Calibration book of dynamically tuned gyroscopes.",
     no_args_is_help=True,
-    pretty_exceptions_enable=False,
     add_completion=False,
+    pretty_exceptions_enable=False,
 )
-commands.command("demo")(demo.demo)
-commands.command("serve")(service.serve)
-commands.command("migrate")(service.migrate)
-commands.command("solve")(solve.solve)
-commands.command("simulate")(simulate.simulate)
-commands.command("upload")(upload.upload)
-commands.add_typer(accounts.users, name="user")
-commands.add_typer(accounts.tokens, name="token")
+
+
+@commands.callback()
+def _driftbook() -> None:
+    """Calibration book of dynamically tuned gyroscopes."""
 
 
 def main() -> None:
     """Run the command line and exit."""
+    structlog.configure(
+        logger_factory=structlog.PrintLoggerFactory(sys.stderr),
+        wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
+    )
     try:
-        commands()
+        sys.exit(commands(standalone_mode=False))
     except AppError as error:
         first, more = error.problems[0].text, len(error.problems) - 1
-        print(f"driftbook: {first}" + (f" (and {more} more)" if more else ""), file=sys.stderr)
-        sys.exit(2)
+        _refuse(first + (f" (and {more} more)" if more else ""))
+    except ClickException as error:
+        _refuse(error.format_message())
+
+
+def _refuse(sentence: str) -> NoReturn:
+    typer.echo(f"driftbook: {sentence}", err=True)
+    sys.exit(2)

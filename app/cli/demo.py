@@ -39,7 +39,7 @@ def demo(
 
 
 def _prepare(folder: Path, reset: bool) -> None:
-    """Empty the folder when asked, or when a build was interrupted; never one that is not a demonstration's."""
+    """Empty the folder when asked or half built; never one that is not a demonstration's."""
     if not folder.exists() or not any(folder.iterdir()):
         return
     ours = (folder / _MARK).exists() or (folder / (_MARK + ".building")).exists()

@@ -13,6 +13,6 @@ Data = Annotated[
 ]
 
 
-def settings(data: Path | None, **changes: int) -> Settings:
+def settings(data: Path | None) -> Settings:
     """The laboratory in that folder."""
-    return Settings(data=data or default_data_folder(), **changes)
+    return Settings(data=data or default_data_folder())

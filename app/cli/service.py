@@ -2,6 +2,7 @@
 
 import socket
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Annotated
 
 import typer
@@ -24,7 +25,9 @@ def serve(
     data: Data = None,
 ) -> None:
     """Run the service with its workers: pages, API and jobs."""
-    run(settings(data, workers=workers), host, port, lambda url: typer.echo(f"Driftbook is on {url}"))
+    run(
+        replace(settings(data), workers=workers), host, port, lambda url: typer.echo(f"Driftbook is on {url}")
+    )
 
 
 def migrate(data: Data = None) -> None:

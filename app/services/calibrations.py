@@ -119,6 +119,12 @@ def calibrations(
     return Page(items, str(rows[limit - 1].id) if len(rows) > limit else None)
 
 
+def current_means(work: Work, session_id: int) -> list[MeansRow]:
+    """The means that count now, by position and repeat."""
+    find_session(work, session_id)
+    return [means_row(row) for row in measurement.current(work.db, session_id)]
+
+
 def means_row(row: Measurement) -> MeansRow:
     """A stored measurement as the solver's input takes it."""
     if row.jx_ma is None or row.jy_ma is None:

@@ -14,18 +14,18 @@ from typing import Any, Final
 import numpy as np
 
 from app.exchange.records import means_row, write_record_parquet
-from app.exchange.rows import CertificateRow, CurrentRecord, MeansRow
+from app.exchange.rows import CertificateRow, MeansRow
 from app.services import access, calibrations, gyros, ingest, stands
 from app.services.computing import solved
 from app.services.lab import Lab, Person, Work
 from app.services.sessions import NewSession, open_session
-from app.services.simulated import certificate_lab, truth_lab
+from app.services.simulated import certificate_lab, degrees, records_lab, truth_values
 from app.store import measurement
-from simdevice.bench import Bench, SimulatedPosition, mean_currents, run_session
+from simdevice.bench import Bench, mean_currents, run_session
 from simdevice.certificate import draw_certificate, sixteen_positions
 from simdevice.fleet import DAY, FleetGyro, demonstration_fleet
 from simdevice.stand import Stand
-from solver.units import deg_from_rad, ma_from_ampere, rad_from_deg
+from solver.units import ma_from_ampere, rad_from_deg
 
 SEED: Final = 2026
 LATITUDE_DEG: Final = 55.7558
@@ -118,7 +118,7 @@ def _measure(work: Work, visit: _Visit, stand: Stand, rows: Sequence[Certificate
         work,
         NewSession(
             visit.gyro.serial, "S1", started_at=visit.at, origin="simulation", new_start=new_start,
-            temperature_c=round(21.5 + np.sin(visit.time / (60 * DAY)), 1), truth=truth_lab(bench.gyro),
+            temperature_c=round(21.5 + np.sin(visit.time / (60 * DAY)), 1), truth=truth_values(bench.gyro),
         ),
     )  # fmt: skip
     ingest.save(work, session.id, _kept(work, bench) if visit.last else _means_only(bench, visit.at))
@@ -131,19 +131,12 @@ def _means_only(bench: Bench, at: datetime) -> list[ingest.Measured]:
 
 def _kept(work: Work, bench: Bench) -> list[ingest.Measured]:
     measured = []
-    for item in run_session(bench, sixteen_positions()).positions:
-        record = _record(item)
+    for record in records_lab(run_session(bench, sixteen_positions()).positions):
         digest = work.files.put(write_record_parquet(record), "parquet")
         row = means_row(record)
-        stored = ingest.StoredRecord(digest, len(item.t), row.duration_s or 0.0, row.rate_hz or 0.0)
+        stored = ingest.StoredRecord(digest, len(record.t_s), row.duration_s or 0.0, row.rate_hz or 0.0)
         measured.append(ingest.Measured(row, ingest.Source("simulation", digest), stored))
     return measured
-
-
-def _record(item: SimulatedPosition) -> CurrentRecord:
-    return CurrentRecord(
-        _degrees(item.theta), _degrees(item.psi), item.t, ma_from_ampere(item.jx), ma_from_ampere(item.jy)
-    )
 
 
 def _means(bench: Bench, at: datetime) -> list[MeansRow]:
@@ -153,7 +146,7 @@ def _means(bench: Bench, at: datetime) -> list[MeansRow]:
     )
     return [
         MeansRow(
-            _degrees(means.theta[row]), _degrees(means.psi[row]), jx_ma[row], jy_ma[row], u_jx_ma[row],
+            degrees(means.theta[row]), degrees(means.psi[row]), jx_ma[row], jy_ma[row], u_jx_ma[row],
             u_jy_ma[row], means.duration, means.rate, at + timedelta(minutes=2.5 * row),
         )
         for row in range(len(means.theta))
@@ -181,7 +174,3 @@ def _leave_one_open(
         work.now = row.started_at or begun
         typed = replace(row, jx_ma=round(row.jx_ma, 7), jy_ma=round(row.jy_ma, 7), u_jx_ma=None, u_jy_ma=None)
         ingest.save_means(work, session.id, typed, ingest.Source("typed"))
-
-
-def _degrees(angle: float) -> float:
-    return round(float(deg_from_rad(angle)), 9)

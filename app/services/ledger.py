@@ -7,8 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from app.errors import Problem, problem
+from app.errors import Problem
 from app.jobs.ledger import Task
+from app.jobs.problems import given_up
 from app.services import calibrations, ingest, simulations
 from app.services.access import SYSTEM
 from app.services.job_views import stored_problem
@@ -16,7 +17,9 @@ from app.services.lab import Lab, Person, Work
 from app.store import results
 from app.store.tables import Job
 
-MAX_ATTEMPTS: Final = 3
+MAX_ATTEMPTS: Final = 10
+"""How often a job is begun at the most. Restarts count too; the engine itself ends a job whose own
+child process keeps dying sooner (`app.jobs.ledger.MAX_CRASHES`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +50,7 @@ class JobLedger:
                 return None
             row.attempts += 1
             if row.attempts > MAX_ATTEMPTS:
-                _end(work, row, "failed", [_gave_up()])
+                _end(work, row, "failed", [given_up(MAX_ATTEMPTS)])
                 return None
             row.state, row.started_at = "running", work.now
             return Task(_KINDS[row.kind].function, _KINDS[row.kind].prepare(work, _session(row), row.request))
@@ -92,12 +95,3 @@ def _session(row: Job) -> int:
 def _end(work: Work, row: Job, state: str, problems: Sequence[Problem] | None) -> None:
     row.state, row.finished_at, row.phase = state, work.now, ""
     row.problems = None if problems is None else [stored_problem(item) for item in problems]
-
-
-def _gave_up() -> Problem:
-    return problem(
-        "job-gave-up",
-        "The computing process died %(attempts)d times on this job, so it is not tried again. "
-        "Its input is kept; tell whoever looks after this installation.",
-        attempts=MAX_ATTEMPTS,
-    )

@@ -3,13 +3,12 @@
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from app.exchange.result import parameters_json
 from app.exchange.rows import CertificateRow, CurrentRecord
-from simdevice.bench import Bench, run_session
+from app.exchange.si import parameter_lab
+from simdevice.bench import Bench, SimulatedPosition, run_session
 from simdevice.certificate import Certificate, Position, certify
 from simdevice.fleet import FleetGyro
 from simdevice.gyro import Gyro
@@ -41,18 +40,12 @@ class Conditions:
 
 def simulated_records(
     conditions: Conditions, rows: Sequence[CertificateRow], latitude_deg: float
-) -> tuple[dict[str, Any], list[CurrentRecord]]:
-    """A session's truth (as in `truth.json`) and its records, θ outer, ψ inner."""
+) -> tuple[dict[str, float], list[CurrentRecord]]:
+    """A session's truth in laboratory units, and its records, θ outer, ψ inner."""
     bench = bench_for(conditions, rows, latitude_deg)
     positions = [Position(rad_from_deg(row.theta_deg), rad_from_deg(row.psi_deg)) for row in rows]
     session = run_session(bench, positions, workers=1)
-    return truth_lab(bench.gyro), [
-        CurrentRecord(
-            theta_deg=row.theta_deg, psi_deg=row.psi_deg, t_s=item.t,
-            jx_ma=ma_from_ampere(item.jx), jy_ma=ma_from_ampere(item.jy),
-        )
-        for row, item in zip(rows, session.positions, strict=True)
-    ]  # fmt: skip
+    return truth_values(bench.gyro), records_lab(session.positions)
 
 
 def bench_for(conditions: Conditions, rows: Sequence[CertificateRow], latitude_deg: float) -> Bench:
@@ -87,21 +80,34 @@ def certificate_lab(certificate: Certificate) -> list[CertificateRow]:
     """The simulator's certificate as rows; the stated uncertainty joins both of its parts."""
     u_arcsec = np.hypot(certificate.u_random, certificate.u_systematic) / rad_from_arcsec(1.0)
     angles_arcsec = certificate.angles / rad_from_arcsec(1.0)
-    degrees = zip(deg_from_rad(certificate.theta), deg_from_rad(certificate.psi), strict=True)
     return [
-        CertificateRow(round(float(theta), 9), round(float(psi), 9), *np.round(angle, 3).tolist(),
+        CertificateRow(degrees(theta), degrees(psi), *np.round(angle, 3).tolist(),
                        *np.round(u, 3).tolist())
-        for (theta, psi), angle, u in zip(degrees, angles_arcsec, u_arcsec, strict=True)
+        for theta, psi, angle, u in zip(
+            certificate.theta, certificate.psi, angles_arcsec, u_arcsec, strict=True
+        )
     ]  # fmt: skip
 
 
-def truth_lab(gyro: Gyro) -> dict[str, Any]:
-    """A gyro's true parameters in laboratory units, as `truth.json` holds them."""
-    values = [getattr(gyro, name) for name in PARAMETERS]
-    parameters = parameters_json(values, None)
-    for entry in parameters.values():
-        del entry["standard_uncertainty"]
-    return {"parameters": parameters}
+def records_lab(positions: Sequence[SimulatedPosition]) -> list[CurrentRecord]:
+    """Simulated records in laboratory units."""
+    return [
+        CurrentRecord(
+            degrees(item.theta), degrees(item.psi), item.t, ma_from_ampere(item.jx), ma_from_ampere(item.jy),
+            item.repeat,
+        )
+        for item in positions
+    ]  # fmt: skip
+
+
+def truth_values(gyro: Gyro) -> dict[str, float]:
+    """A gyro's true parameters by name, in laboratory units."""
+    return {name: parameter_lab(name, getattr(gyro, name)) for name in PARAMETERS}
+
+
+def degrees(angle: float) -> float:
+    """A commanded angle in degrees as a person writes it, without what the conversion left."""
+    return round(float(deg_from_rad(angle)), 9)
 
 
 def _seed_of(name: str) -> int:

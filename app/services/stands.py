@@ -2,10 +2,14 @@
 
 import hashlib
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import date
+from decimal import Decimal
 
 from app.errors import Conflict, Invalid, NotFound, problem
 from app.exchange.certificate import write_certificate_csv
+from app.exchange.fields import full_turn
+from app.exchange.positions import Positions
 from app.exchange.rows import CertificateRow
 from app.services.lab import Work
 from app.services.names import checked_name
@@ -54,7 +58,7 @@ def add_certificate(
     Raises
     ------
     Invalid
-        No position, a validity that ends before it begins.
+        No position, one position twice, a validity that ends before it begins.
     Conflict
         The stand has a certificate of that number.
     """
@@ -70,7 +74,7 @@ def add_certificate(
         raise Conflict(problem("certificate-exists", "Stand %(stand)s has a certificate %(number)s already; "
                                "certificates never change, so give the new one its own number.",
                                column="number", stand=stand_name, number=number))  # fmt: skip
-    ordered = sorted(rows, key=lambda item: (item.theta_deg, item.psi_deg))
+    ordered = sorted(_in_one_turn(rows), key=lambda item: (item.theta_deg, item.psi_deg))
     version = 1 + max((item.version for item in equipment.certificates(work.db, row.id)), default=0)
     certificate = StandCertificate(
         stand=row, number=number, version=version, valid_from=valid_from, valid_until=valid_until,
@@ -81,6 +85,22 @@ def add_certificate(
     work.db.add(certificate)
     work.db.flush()
     return certificate_view(certificate, work.now.date())
+
+
+def _in_one_turn(rows: Sequence[CertificateRow]) -> list[CertificateRow]:
+    """The rows with θ and ψ in [0, 360)°, each position once."""
+    known, turned, twice = Positions(), [], []
+    for number, row in enumerate(rows, start=1):
+        theta_deg, psi_deg = (full_turn(Decimal(repr(angle))) for angle in (row.theta_deg, row.psi_deg))
+        before = len(known)
+        if known.put(theta_deg, psi_deg) < before:
+            twice.append(problem("duplicate-position", "The position θ %(theta)g°, ψ %(psi)g° is there already. "
+                                 "Keep one of the two.", row=number, column="theta_deg", theta=theta_deg,
+                                 psi=psi_deg))  # fmt: skip
+        turned.append(replace(row, theta_deg=theta_deg, psi_deg=psi_deg))
+    if twice:
+        raise Invalid(*twice)
+    return turned
 
 
 def certificate(work: Work, stand_name: str, number: str) -> CertificateView:

@@ -1,0 +1,124 @@
+"""A simulated session on disk."""
+
+from dataclasses import replace
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app.errors import Conflict, Invalid, problem
+from app.exchange.archive import save
+from app.exchange.numbers import typed
+from app.exchange.rows import Facts
+from app.exchange.session_writing import session_files
+from app.services.simulated import certificate_lab, records_lab, truth_values
+from simdevice.bench import Bench, run_session
+from simdevice.certificate import Position, sixteen_positions
+from simdevice.noise import RateNoise
+from simdevice.scenarios import SCENARIOS
+from solver.units import rad_from_deg, rad_per_s_from_deg_per_h
+
+
+class Format(StrEnum):
+    """Formats of record files."""
+
+    CSV = "csv"
+    PARQUET = "parquet"
+
+
+_HELP = "; ".join(f"{item.name}: {item.summary}" for item in SCENARIOS.values())
+
+
+def simulate(
+    out: Annotated[Path, typer.Option("--out", help="Folder to write; it must be empty or new.")],
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Everything random comes from it.")] = 0,
+    latitude: Annotated[
+        float | None, typer.Option("--latitude", min=-90, max=90, help="Degrees, south negative.")
+    ] = None,
+    positions: Annotated[
+        str, typer.Option("--positions", help="16, 8, or a list such as 0/0,0/90,90/180.")
+    ] = "16",
+    duration: Annotated[float, typer.Option("--duration", min=0.01, max=3600, help="Of a record, s.")] = 60.0,
+    rate: Annotated[float, typer.Option("--rate", min=1, max=20000, help="Samples per second.")] = 200.0,
+    file_format: Annotated[Format, typer.Option("--format", help="Of the record files.")] = Format.CSV,
+    scenario: Annotated[str, typer.Option("--scenario", help=_HELP)] = "gvk-6",
+    noise: Annotated[
+        float | None,
+        typer.Option("--noise-deg-per-h", min=0, max=100, help="Noise of a position's mean."),
+    ] = None,
+    gyro: Annotated[str | None, typer.Option("--gyro", help="Serial number for session.json.")] = None,
+    stand: Annotated[str | None, typer.Option("--stand", help="Stand for session.json.")] = None,
+) -> None:
+    """Simulate a session: records of currents, certificate, session.json, truth.json."""
+    _refuse_full(out)
+    bench = _bench(scenario, seed, _positions(positions), latitude, rate, duration, noise)
+    session = run_session(bench, _positions(positions))
+    facts = Facts(gyro=gyro, stand=stand, latitude_deg=_latitude_deg(latitude, bench))
+    files = session_files(
+        facts,
+        records=records_lab(session.positions),
+        certificate=certificate_lab(bench.stand.certificate),
+        truth=truth_values(bench.gyro),
+        record_format=file_format.value,
+    )
+    save(files, out)
+    typer.echo(f"{len(session.positions)} positions in {out}")
+
+
+def _latitude_deg(latitude: float | None, bench: Bench) -> float:
+    return latitude if latitude is not None else round(bench.stand.latitude / rad_from_deg(1.0), 9)
+
+
+def _bench(
+    name: str, seed: int, places: tuple[Position, ...], latitude: float | None, rate: float,
+    duration: float, noise: float | None,
+) -> Bench:  # fmt: skip
+    if name not in SCENARIOS:
+        raise Invalid(problem("unknown-scenario", "There is no scenario %(name)s. There are: %(names)s.",
+                              column="--scenario", name=name, names=", ".join(SCENARIOS)))  # fmt: skip
+    bench = replace(SCENARIOS[name].bench(seed, places), rate=rate, duration=duration)
+    if latitude is not None:
+        bench = replace(bench, stand=replace(bench.stand, latitude=rad_from_deg(latitude)))
+    if noise is not None:
+        walk = rad_per_s_from_deg_per_h(noise) * duration**0.5
+        bench = replace(bench, noise=RateNoise(angle_random_walk=walk))
+    return bench
+
+
+def _positions(text: str) -> tuple[Position, ...]:
+    if text == "16":
+        return sixteen_positions()
+    if text == "8":
+        return sixteen_positions()[:8]
+    places = [_position(part) for part in text.split(",")]
+    if len({place.key for place in places}) < len(places):
+        raise Invalid(problem("duplicate-position", "A position is listed twice.", column="--positions"))
+    return tuple(places)
+
+
+def _position(text: str) -> Position:
+    theta, slash, psi = text.partition("/")
+    if not slash:
+        raise Invalid(
+            problem(
+                "bad-position",
+                "“%(text)s” is no position; write θ/ψ in degrees, such as 90/180.",
+                column="--positions",
+                text=text,
+            )
+        )
+    theta_deg, psi_deg = (typed(angle, "deg", column="--positions") for angle in (theta, psi))
+    return Position(rad_from_deg(theta_deg), rad_from_deg(psi_deg))
+
+
+def _refuse_full(folder: Path) -> None:
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise Conflict(
+            problem(
+                "not-empty",
+                "%(folder)s is not an empty folder; nothing there is overwritten. Name a new one.",
+                column="--out",
+                folder=str(folder),
+            )
+        )

@@ -1,0 +1,141 @@
+"""Calibrating files, with no database."""
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from app.cli.sessions_on_disk import Item, items
+from app.cli.tables import print_result
+from app.errors import AppError, Invalid, Problem, problem
+from app.exchange.certificate import read_certificate
+from app.exchange.result import dumps, message_json
+from app.exchange.rows import CertificateRow
+from app.exchange.session_folder import SessionFiles
+from app.exchange.si import incomplete_uncertainties
+from app.services.computing import solved
+from solver.errors import Message
+
+
+class Method(StrEnum):
+    """Methods by their names."""
+
+    LEAST_SQUARES = "least-squares"
+    PAPER = "paper"
+    BOTH = "both"
+
+
+def solve(
+    currents: Annotated[list[Path], typer.Argument(help="Means, records, session folders, folders of them.")],
+    certificate: Annotated[
+        Path | None, typer.Option("--certificate", help="The stand's certificate (CSV, Parquet).")
+    ] = None,
+    latitude: Annotated[
+        float | None,
+        typer.Option("--latitude", min=-90, max=90, help="Of the stand, degrees; south negative."),
+    ] = None,
+    method: Annotated[Method, typer.Option("--method", help="How to solve.")] = Method.LEAST_SQUARES,
+    as_json: Annotated[bool, typer.Option("--json", help="For programs: one JSON object per item.")] = False,
+) -> None:
+    """Calibrate from files: a table for people, JSON for programs."""
+    angles = _certificate(certificate) if certificate else None
+    every = list(items(currents))
+    several = len(every) > 1
+    failed = False
+    for item in every:
+        try:
+            result = _solve_one(item, angles, certificate, latitude, method)
+        except AppError as error:
+            if not several:
+                raise
+            failed = True
+            _tell_failure(item, error, as_json)
+            continue
+        if as_json:
+            typer.echo(dumps({"file": item.name, **result} if several else result))
+        else:
+            print_result(item.name, result)
+    if failed:
+        sys.exit(2)
+
+
+def _certificate(path: Path) -> list[CertificateRow]:
+    if not path.is_file():
+        raise Invalid(problem("no-file", "There is no such file.", file=str(path)))
+    return read_certificate(path.read_bytes(), str(path))[0]
+
+
+def _solve_one(
+    item: Item,
+    angles: list[CertificateRow] | None,
+    named: Path | None,
+    latitude: float | None,
+    method: Method,
+) -> dict[str, Any]:
+    session = item.read()
+    rows = list(angles or session.certificate)
+    if not rows:
+        raise Invalid(problem("no-certificate", "There is no certificate with these currents. Name one with "
+                              "--certificate FILE.", file=item.name))  # fmt: skip
+    latitude_deg = session.facts.latitude_deg if latitude is None else latitude
+    if latitude_deg is None:
+        raise Invalid(
+            problem(
+                "no-latitude",
+                "The stand's latitude is not known. Give it with --latitude DEG, south negative.",
+                file=item.name,
+            )
+        )
+    means = session.measured()
+    output = solved(means, rows, latitude_deg, method.value)
+    result: dict[str, Any] = json.loads(output["result"])
+    warnings = [*session.warnings, *_differences(session, rows, named, latitude_deg)]
+    incomplete = incomplete_uncertainties(means)
+    warnings += [incomplete] if incomplete else []
+    if warnings:
+        result["input_warnings"] = [message_json(warning) for warning in warnings]
+    return result
+
+
+def _differences(
+    session: SessionFiles, rows: list[CertificateRow], named: Path | None, latitude_deg: float
+) -> list[Message]:
+    """What the command line says otherwise than the session's own files: the command line wins."""
+    found = []
+    if session.facts.latitude_deg is not None and session.facts.latitude_deg != latitude_deg:
+        found.append(
+            Message("latitude-differs", "The session's files say latitude %(theirs)g°; %(used)g° was given "
+                    "and is used.", {"theirs": session.facts.latitude_deg, "used": latitude_deg})
+        )  # fmt: skip
+    if named and session.certificate and _by_place(session.certificate) != _by_place(rows):
+        found.append(
+            Message("certificate-differs", "The session's files hold another certificate; %(used)s was given "
+                    "and is used.", {"used": str(named)})
+        )  # fmt: skip
+    return found
+
+
+def _by_place(rows: Sequence[CertificateRow]) -> list[tuple[float, ...]]:
+    places = [
+        (row.theta_deg, row.psi_deg, row.alpha_arcsec, row.beta_arcsec, row.gamma_arcsec) for row in rows
+    ]
+    return sorted(places)
+
+
+def _tell_failure(item: Item, error: AppError, as_json: bool) -> None:
+    first = error.problems[0]
+    if as_json:
+        told = {**_problem_json(first), "problems": len(error.problems)}
+        typer.echo(dumps({"file": item.name, "error": told}))
+    else:
+        typer.echo(f"driftbook: {item.name}: {first.text}", err=True)
+
+
+def _problem_json(item: Problem) -> dict[str, Any]:
+    places = {name: value for name, value in asdict(item).items() if name != "message" and value is not None}
+    return {"code": item.message.code, "message": item.text, **places}

@@ -1,0 +1,78 @@
+"""A result as a table in a terminal."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from app.figures import decimals_of, rounded
+
+_NAMES = {
+    "kx": "Kx  scale factor, x", "ky": "Ky  scale factor, y", "kxy": "Kxy cross-coupling, y into x",
+    "kyx": "Kyx cross-coupling, x into y", "w0x": "ω0x fixed drift, x", "w0y": "ω0y fixed drift, y",
+    "wg": "ωg  g-drift, direct", "wk": "ωк  g-drift, quadrature",
+}  # fmt: skip
+_FACTOR = 2.0
+
+
+def print_result(name: str, result: Mapping[str, Any]) -> None:
+    """Print a result: parameters with U (k = 2), the fit, warnings."""
+    console = Console(highlight=False)
+    methods = ("least-squares", "paper") if result["method"] == "both" else (result["method"],)
+    answers = {method: result[method] if result["method"] == "both" else result for method in methods}
+    table = Table(title=name, title_justify="left", box=None, pad_edge=False)
+    table.add_column("parameter")
+    for method in methods:
+        table.add_column(method, justify="right")
+        table.add_column("± U", justify="right")
+    table.add_column("unit")
+    for key, label in _NAMES.items():
+        cells = [cell for method in methods for cell in _cells(answers[method], key)]
+        table.add_row(label, *cells, _unit(key))
+    console.print(table)
+    for method in methods:
+        console.print(_fit_line(method, answers[method]))
+    _print_warnings(result, answers)
+
+
+def _cells(answer: Mapping[str, Any], key: str) -> tuple[str, str]:
+    if "error" in answer:
+        return "–", "–"
+    entry = answer["parameters"][key]
+    if entry["value"] is None:
+        return "not determined", "–"
+    u = entry["standard_uncertainty"]
+    decimals = decimals_of(None if u is None else _FACTOR * u)
+    if u is None or decimals is None:
+        return f"{entry['value']:.9g}".replace("-", "−"), "–"
+    return rounded(entry["value"], decimals).replace("-", "−"), rounded(_FACTOR * u, decimals)
+
+
+def _unit(key: str) -> str:
+    return "°/h/mA" if key.startswith("k") else "°/h/g" if key in ("wg", "wk") else "°/h"
+
+
+def _fit_line(method: str, answer: Mapping[str, Any]) -> str:
+    if "error" in answer:
+        return f"{method}: {answer['error']['message']}"
+    fit, parts = (
+        answer["fit"],
+        [f"{method}: {answer['fit']['dof']} degrees of freedom, rank {answer['fit']['rank']}"],
+    )
+    if fit["condition"] is not None:
+        parts.append(f"condition {fit['condition']:.3g}")
+    if fit["chi2"] is not None:
+        parts.append(f"χ² {fit['chi2']:.4g}, p {fit['p_value']:.3g}")
+    if answer["iterations"]:
+        parts.append(f"{len(answer['iterations'])} rounds")
+    return ", ".join(parts) + "; U is k·u, k = 2, noise of the currents only"
+
+
+def _print_warnings(result: Mapping[str, Any], answers: Mapping[str, Mapping[str, Any]]) -> None:
+    told = [item["message"] for item in result.get("input_warnings", ())]
+    for answer in answers.values():
+        told += [item["message"] for item in answer.get("warnings", ())]
+    for message in dict.fromkeys(told):
+        typer.echo(f"warning: {message}", err=True)

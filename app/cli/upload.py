@@ -1,0 +1,193 @@
+"""What the stand's computer runs: bring a session to the server, as often as it takes."""
+
+import hashlib
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import httpx
+import typer
+from rich.progress import track
+
+from app.cli.sessions_on_disk import Item, items
+from app.cli.solve import Method
+from app.errors import AppError, Invalid, problem
+from app.exchange.record_files import write_record_parquet
+from app.exchange.record_places import record_name
+from app.exchange.rows import Facts, MeansRow
+from app.exchange.session_folder import SessionFiles
+
+_ATTEMPTS = 6
+_FIRST_PAUSE_S = 0.5
+_API = "/api/v1"
+
+
+class ServerRefused(AppError):
+    """The server answered, and said no."""
+
+
+class Unreachable(AppError):
+    """The server did not answer in spite of several attempts."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """One request of an upload: a position's means or its record."""
+
+    path: str
+    params: dict[str, Any]
+    json: dict[str, Any] | None = None
+    content: bytes | None = None
+
+
+def upload(
+    path: Annotated[Path, typer.Argument(help="Session folder, ZIP archive, or file of means or records.")],
+    server: Annotated[str, typer.Option("--server", help="Address of the service.")],
+    token: Annotated[str, typer.Option("--token", envvar="DRIFTBOOK_TOKEN", help="With the scope upload.")],
+    gyro: Annotated[
+        str | None, typer.Option("--gyro", help="Serial number, if session.json has none.")
+    ] = None,
+    stand: Annotated[str | None, typer.Option("--stand", help="Stand, if session.json has none.")] = None,
+    certificate: Annotated[
+        str | None,
+        typer.Option("--certificate", help="Number of the stand's certificate, if not the valid one."),
+    ] = None,
+    method: Annotated[
+        Method | None, typer.Option("--solve", help="Ask for the calibration and wait for it.")
+    ] = None,
+) -> None:
+    """Upload a session; safe to repeat: what the server has already is not doubled."""
+    for item in items([path]):
+        session = item.read()
+        with httpx.Client(base_url=server.rstrip("/") + _API, timeout=60, headers=_bearer(token)) as client:
+            number = _open_session(client, item, session, gyro, stand, certificate)
+            parts = list(_parts(session, number))
+            for part in track(parts, description=f"session {number}", transient=True):
+                _send(client, "PUT", part.path, params=part.params, json=part.json, content=part.content)
+            typer.echo(f"{item.name}: session {number}, {len(parts)} positions")
+            if method:
+                _solve(client, number, method)
+
+
+def _bearer(token: str) -> dict[str, str]:
+    return {"Authorization": f"Bearer {token}"}
+
+
+def _open_session(
+    client: httpx.Client,
+    item: Item,
+    session: SessionFiles,
+    gyro: str | None,
+    stand: str | None,
+    certificate: str | None,
+) -> int:
+    body: dict[str, Any] = {
+        "gyro": gyro or session.facts.gyro,
+        "stand": stand or session.facts.stand,
+        "certificate": certificate,
+        "started_at": _started_at(session.facts),
+        "temperature_c": session.facts.temperature_c,
+    }
+    for name in ("gyro", "stand"):
+        if not body[name]:
+            raise Invalid(
+                problem(
+                    f"no-{name}",
+                    "The session does not say which %(name)s it is of. Name it with --%(name)s.",
+                    file=item.name,
+                    name=name,
+                )
+            )
+    said = {name: value for name, value in body.items() if value is not None}
+    answer = _send(client, "POST", "/sessions", json=said, headers={"Idempotency-Key": _key(session, said)})
+    return int(answer.json()["id"])
+
+
+def _started_at(facts: Facts) -> str | None:
+    return None if facts.started_at is None else facts.started_at.isoformat()
+
+
+def _key(session: SessionFiles, said: dict[str, Any]) -> str:
+    """The same session uploaded again has the same key, so the server opens no second one."""
+    digest = hashlib.sha256(repr(sorted(said.items())).encode())
+    for part in _parts(session, 0):
+        digest.update(repr((part.path, part.params, part.json)).encode())
+        digest.update(part.content or b"")
+    return "upload-" + digest.hexdigest()
+
+
+def _parts(session: SessionFiles, number: int) -> Iterator[_Part]:
+    recorded = set()
+    for record in session.records:
+        name = record_name(record.theta_deg, record.psi_deg, record.repeat, "parquet")
+        place = f"/sessions/{number}/positions/{record.theta_deg:.15g}/{record.psi_deg:.15g}/currents"
+        recorded.add((record.theta_deg, record.psi_deg))
+        params = {"repeat": record.repeat, "filename": name}
+        yield _Part(place, params, content=write_record_parquet(record))
+    for row in session.means:
+        if (row.theta_deg, row.psi_deg) not in recorded:
+            place = f"/sessions/{number}/positions/{row.theta_deg:.15g}/{row.psi_deg:.15g}/means"
+            yield _Part(place, {"repeat": row.repeat}, json=_means_body(row))
+
+
+def _means_body(row: MeansRow) -> dict[str, Any]:
+    body = {
+        "jx_ma": row.jx_ma, "jy_ma": row.jy_ma, "u_jx_ma": row.u_jx_ma, "u_jy_ma": row.u_jy_ma,
+        "duration_s": row.duration_s, "rate_hz": row.rate_hz, "temperature_c": row.temperature_c,
+        "started_at": None if row.started_at is None else row.started_at.isoformat(),
+    }  # fmt: skip
+    return {name: value for name, value in body.items() if value is not None}
+
+
+def _send(client: httpx.Client, verb: str, path: str, **what: Any) -> httpx.Response:
+    """Send, again and again while the server is away; every request here may be repeated."""
+    pause_s = _FIRST_PAUSE_S
+    for attempt in range(_ATTEMPTS):
+        try:
+            answer = client.request(
+                verb, path, **{name: value for name, value in what.items() if value is not None}
+            )
+        except httpx.TransportError as error:
+            reason = str(error) or type(error).__name__
+        else:
+            if answer.status_code < 500:
+                return _accepted(answer, client)
+            reason = f"status {answer.status_code}"
+        if attempt < _ATTEMPTS - 1:
+            time.sleep(pause_s)
+            pause_s *= 2
+    raise Unreachable(
+        problem(
+            "unreachable",
+            "%(server)s does not answer (%(reason)s). What was sent is kept there; run the same command again.",
+            server=str(client.base_url),
+            reason=reason,
+        )
+    )
+
+
+def _accepted(answer: httpx.Response, client: httpx.Client) -> httpx.Response:
+    if answer.is_success:
+        return answer
+    try:
+        detail = answer.json()["detail"]
+    except (ValueError, KeyError, TypeError):
+        detail = f"status {answer.status_code}; is there a Driftbook at this address?"
+    raise ServerRefused(
+        problem("refused", "%(server)s says: %(detail)s", server=str(client.base_url), detail=detail)
+    )
+
+
+def _solve(client: httpx.Client, number: int, method: Method) -> None:
+    job = _send(client, "POST", f"/sessions/{number}/calibrations", json={"method": method.value}).json()
+    while job["state"] in ("queued", "running"):
+        time.sleep(0.2)
+        job = _send(client, "GET", f"/jobs/{job['id']}").json()
+    if job["state"] != "succeeded":
+        detail = (job["error"] or {}).get("detail", job["state"])
+        raise ServerRefused(
+            problem("not-solved", "The calibration gave no result: %(detail)s", detail=detail)
+        )
+    typer.echo(f"{client.base_url.copy_with(path=job['result'])}")
