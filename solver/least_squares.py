@@ -158,22 +158,24 @@ def _solve_shared(design: Array, right_sides: Array) -> tuple[Array, Array]:
 def _solve_block(design: Array, right_side: Array, start: Array, values: Array, covariance: Array) -> None:
     """Solve one block into `values` and `covariance`, beginning from `start` (p,)."""
     normal = np.ascontiguousarray((design.transpose(0, 2, 1) @ design).transpose(1, 2, 0))
-    with np.errstate(divide="ignore", invalid="ignore"):  # a column of zeros: doubtful below
+    rest = right_side - design @ start
+    answer = np.repeat(start[:, None], len(design), axis=1)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a deficient design is doubtful
         unscale = 1.0 / np.sqrt(np.einsum("iib->ib", normal))
         normal *= unscale[:, None] * unscale
         _invert(normal)
-    rest = right_side - design @ start
-    answer = np.repeat(start[:, None], len(design), axis=1)
-    kappa = np.sqrt(np.abs(len(start) * np.einsum("iib->b", normal)))
-    for last in (False, True):
-        difference = np.einsum("ijb,jb->ib", normal, np.vecmat(rest, design).T * unscale)
-        answer += difference * unscale
-        error = _SAFETY * _EPS * kappa * (kappa * _length(difference) + _length(answer / unscale))
-        doubtful = ~(error < AGREEMENT)  # true for NaN
-        if last or not doubtful.any():
-            break
-        rest = right_side - np.matvec(design, answer.T)
-    normal *= unscale[:, None] * unscale
+        variances = np.einsum("iib->ib", normal)
+        # Scaled variances are at least 1; less is the rounding of a singular matrix.
+        kappa = np.where(variances.min(axis=0) > 0.5, np.sqrt(len(start) * variances.sum(axis=0)), np.inf)
+        for last in (False, True):
+            difference = np.einsum("ijb,jb->ib", normal, np.vecmat(rest, design).T * unscale)
+            answer += difference * unscale
+            error = _SAFETY * _EPS * kappa * (kappa * _length(difference) + _length(answer / unscale))
+            doubtful = ~(error < AGREEMENT)  # also where it is NaN
+            if last or not doubtful.any():
+                break
+            rest = right_side - np.matvec(design, answer.T)
+        normal *= unscale[:, None] * unscale
     values[:] = answer.T
     covariance[:] = normal.transpose(2, 0, 1)
     if doubtful.any():

@@ -45,6 +45,7 @@ CLEAR_OF_NOISE: Final = 7.0
 _SHRUNK_BY_U: Final = 1.5
 _UNTOLD_NOISE: Final = 1e-3
 _ABSOLUTE_ROUNDS: Final = 30
+_BLUNDERS: Final = 0.5
 _MEDIAN_OF_NORMAL: Final = 0.6745
 _ROUNDING: Final = 1e-10
 _NO_PART: Final = 1e-8
@@ -111,8 +112,10 @@ def find_invisible(equations: Equations, rows: Array | None = None) -> Invisible
     hidden[:, 4:] = hidden_angles
     in_currents = _hidden_currents(currents, noise, basis, scale)
     if robust is not None and len(in_currents):
-        noise = robust()
-        in_currents = _hidden_currents(currents, noise, basis, scale)
+        without_blunders = robust()
+        if without_blunders[0, 0] < _BLUNDERS * noise[0, 0]:
+            noise = without_blunders
+            in_currents = _hidden_currents(currents, noise, basis, scale)
     completed = np.hstack((in_currents, -in_currents @ (pseudo_inverse @ scaled[:, :4]).T))
     shares = _sparse(np.concatenate((completed, hidden)))
     part = np.sqrt(np.sum(shares**2, axis=0)) > _NO_PART
