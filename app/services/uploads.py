@@ -129,6 +129,7 @@ def bring_in(work: Work, arrived: Arrived, wanted: Wanted) -> BroughtIn:
         Neither the files nor the request name gyro and stand; a position is not certified.
     """
     opened = sessions.open_session(work, _new_session(arrived.facts, wanted))
+    job: JobView | None
     if arrived.measured is None:
         job = ingest.request_import(work, opened.id, arrived.digest, arrived.name, wanted.method)
         return BroughtIn(sessions.session(work, opened.id), (), job, arrived.warnings)

@@ -41,6 +41,19 @@ class RecordFiles:
         _sync_folder(self.folder)
         return digest
 
+    def take(self, file: Path, suffix: str) -> str:
+        """Keep a file's bytes without reading them whole: it is moved, from this very file system."""
+        with file.open("rb") as content:
+            digest = hashlib.file_digest(content, "sha256").hexdigest()
+            os.fsync(content.fileno())
+        target = self.path(digest, suffix)
+        if not target.exists():
+            target.parent.mkdir(parents=True, exist_ok=True)
+            file.replace(target)
+            _sync_folder(target.parent)
+            _sync_folder(self.folder)
+        return digest
+
     def path(self, digest: str, suffix: str) -> Path:
         """Where the bytes with this digest are."""
         return self.folder / digest[:2] / f"{digest[2:]}.{suffix}"

@@ -1,0 +1,63 @@
+"""The REST API for machines, under ``/api/v1``: one module per noun, the same nouns as the pages.
+
+A handler parses, calls a service, and answers by a schema; it is synchronous and runs in a thread,
+and its transaction is committed before the answer is sent. Errors become problem documents in
+`problems`. `create` makes an application of its own, to be mounted at `ROOT`, whose ``state.lab``
+is set when the laboratory is open.
+"""
+
+from importlib.metadata import version
+from typing import Final
+
+from fastapi import FastAPI
+
+from app.api import (
+    calibrations,
+    certificates,
+    docs,
+    gyros,
+    history,
+    jobs,
+    openapi,
+    positions,
+    problems,
+    sessions,
+    simulations,
+    stands,
+    types,
+    uploads,
+)
+from app.api.health import router as health
+from app.api.links import ROOT
+from app.api.metrics import Metrics
+from app.api.problems import response as problem_response
+from app.api.problems import unforeseen
+
+__all__ = ["ROOT", "Metrics", "create", "health", "problem_response", "unforeseen"]
+
+_DESCRIPTION: Final = (
+    "Calibration of dynamically tuned gyroscopes: gyros, stands and their certificates, sessions, "
+    "results. Every number is in the unit that its field's name ends with."
+)
+_NOUNS: Final = (
+    gyros, history, types, stands, certificates, uploads, sessions, positions, calibrations, simulations,
+    jobs, docs,
+)  # fmt: skip
+
+
+def create() -> FastAPI:
+    """The API's application."""
+    app = FastAPI(
+        title="Driftbook",
+        version=version("driftbook"),
+        description=_DESCRIPTION,
+        servers=[{"url": ROOT}],
+        root_path_in_servers=False,
+        docs_url=None,
+        redoc_url=None,
+    )
+    problems.install(app)
+    for noun in _NOUNS:
+        app.include_router(noun.router)
+    app.openapi = lambda: openapi.describe(app)  # type: ignore[method-assign]
+    return app
