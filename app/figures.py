@@ -4,6 +4,7 @@ A value is shown down to the second significant digit of its expanded uncertaint
 never further; a minus is U+2212; four digits are not grouped.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from decimal import ROUND_HALF_EVEN, Decimal
@@ -105,6 +106,12 @@ def plain(value: float | None, largest_decimals: int = 10) -> str:
     return localised(text if text not in ("-0", "") else "0")
 
 
+def places(values: Iterable[float | None], most: int = 6) -> int:
+    """Decimal places that show all these numbers as they were given, at most so many."""
+    found = [Decimal(repr(value)).normalize().as_tuple().exponent for value in values if value is not None]
+    return max([0, *(min(most, -item) for item in found if isinstance(item, int))])
+
+
 def entered(value: float | None) -> str:
     """A number for a form's field: the shortest decimal that reads back as the same bits."""
     if value is None:
@@ -181,6 +188,6 @@ def degrees(value: float) -> str:
 
 __all__ = [
     "DASH", "MINUS", "Figure", "Measured", "age", "clock", "day", "decimals_of", "degrees", "duration",
-    "entered", "figure", "instant", "long_day", "measured", "plain", "rounded", "significant",
+    "entered", "figure", "instant", "long_day", "measured", "places", "plain", "rounded", "significant",
     "superscript", "term",
 ]  # fmt: skip

@@ -32,6 +32,9 @@ TEMPLATES: Final = Path(__file__).parents[2] / "templates"
 LANGUAGE_COOKIE: Final = "lang"
 THEME_COOKIE: Final = "theme"
 THEMES: Final = ("light", "dark")
+PAGING: Final = ("after", "before", "start")
+"""Parts of a query that say where in a list one is; a change of anything else starts it anew."""
+
 _LOGIN: Final = "driftbook_login"
 
 
@@ -78,8 +81,11 @@ def _environment() -> jinja2.Environment:
 
 
 def with_query(request: Request, **changes: Any) -> str:
-    """The address of the page asked for, with some of its query changed; None takes a part away."""
-    query = dict(request.query_params) | changes
+    """The address of the page asked for with some of its query changed, at the list's beginning.
+
+    None takes a part away.
+    """
+    query = {name: value for name, value in request.query_params.items() if name not in PAGING} | changes
     kept = {name: value for name, value in query.items() if value not in (None, "")}
     return f"{request.url.path}?{urlencode(kept)}" if kept else request.url.path
 

@@ -31,6 +31,17 @@ PARAMETER_NAMES: Final = {
 }  # fmt: skip
 """The eight parameters in words; pass through `parameter`."""
 
+PARAMETER_UNITS: Final = {
+    **dict.fromkeys(("kx", "ky", "kxy", "kyx"), "deg/h/mA"), **dict.fromkeys(("w0x", "w0y"), "deg/h"),
+    **dict.fromkeys(("wg", "wk"), "deg/h/g"),
+}  # fmt: skip
+"""Unit of each parameter; pass through `unit`."""
+
+_SUFFIXES: Final = {
+    **dict.fromkeys(("kx", "ky", "kxy", "kyx"), "deg_per_h_per_ma"),
+    **dict.fromkeys(("w0x", "w0y"), "deg_per_h"), **dict.fromkeys(("wg", "wk"), "deg_per_h_per_g"),
+}  # fmt: skip
+
 _UNITS: Final = {
     "deg/h/mA": marked("°/h/mA"), "deg/h": marked("°/h"), "deg/h/g": marked("°/h/g"), "mA": marked("mA"),
     "µA": marked("µA"), "nA": marked("nA"), "s": marked("s"), "Hz": marked("Hz"), "arcsec": "″",
@@ -97,6 +108,11 @@ def _index(name: str) -> tuple[str, str]:
 def parameter(name: str) -> str:
     """A parameter in words."""
     return gettext(PARAMETER_NAMES[name])
+
+
+def field(name: str) -> str:
+    """Name of a parameter's column or field, with its unit: ``w0x_deg_per_h``."""
+    return f"{name}_{_SUFFIXES[name]}"
 
 
 def unit(name: str) -> str:
