@@ -22,6 +22,18 @@ Psi = Annotated[PathAngle, Path(description="ψ in degrees.")]
 _PLACE: Final = "/sessions/{session_id}/positions/{theta_deg}/{psi_deg}"
 
 
+class Which(Incoming):
+    """Which measurement of the position."""
+
+    repeat: Repeat = 0
+
+
+class Naming(Which):
+    """What a record's bytes do not say."""
+
+    filename: Name | None = None
+
+
 def _saved(model: Any) -> dict[int | str, dict[str, Any]]:
     return {
         200: {"model": model, "description": "The very same is there already."},
@@ -45,21 +57,21 @@ def listing(session_id: Id, caller: Reader, request: Request) -> Response | List
 
 @router.put(_PLACE + "/means", status_code=201, responses=_saved(Measurement))
 def put_means(
-    session_id: Id, theta_deg: Theta, psi_deg: Psi, body: NewMeans, caller: Uploader, response: Response
+    session_id: Id,
+    theta_deg: Theta,
+    psi_deg: Psi,
+    which: Annotated[Which, Query()],
+    body: NewMeans,
+    caller: Uploader,
+    response: Response,
 ) -> Measurement:
     """Save the means of one position: 200 when they are there already, else a new revision."""
-    row = MeansRow(theta_deg, psi_deg, **body.model_dump(exclude={"note"}))
+    repeat = which.repeat if body.repeat is None else body.repeat
+    row = MeansRow(theta_deg, psi_deg, **body.model_dump(exclude={"note", "repeat"}), repeat=repeat)
     with caller.write() as work:
         saved = ingest.save_means(work, session_id, row, ingest.Source("api"), body.note)
     response.status_code = 201 if saved.new else 200
     return Measurement.model_validate(saved.measurement)
-
-
-class Naming(Incoming):
-    """What a record's bytes do not say."""
-
-    filename: Name | None = None
-    repeat: Repeat = 0
 
 
 @router.put(

@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from app.errors import Invalid, problem
-from app.exchange.records import means_row, read_record, write_record_parquet
+from app.exchange.items import read_item
 from app.exchange.result import ResultMethod, calibration_json, dumps, parameters_json
 from app.exchange.rows import CertificateRow, CurrentRecord, MeansRow
 from app.exchange.si import observations
+from app.services.keeping import keep_record
 from app.services.simulated import Conditions, simulated_records
 from app.store.records import RecordFiles
 from solver.calibrate import calibrate as solve
@@ -68,12 +69,13 @@ def _history_rows(estimate: Estimate) -> list[dict[str, Any]]:
 
 
 def import_records(payload: Mapping[str, Any], report: Report) -> dict[str, Any]:
-    """Read an uploaded file of records, keep each position's record, give the means."""
+    """Read an uploaded session or file, keep each position's record, give the means."""
     files = RecordFiles(Path(payload["records"]))
     report(0.02, "reading")
     source = files.read(payload["source"], payload["suffix"])
-    records, _ = read_record(source, payload["name"])
-    return {"measured": _kept(files, records, report, until=1.0)}
+    item = read_item(source, payload["name"])
+    typed = [{"means": asdict(row), "record": None} for row in item.measured()[len(item.records) :]]
+    return {"measured": _kept(files, item.records, report, until=1.0) + typed}
 
 
 def simulate(payload: Mapping[str, Any], report: Report) -> dict[str, Any]:
@@ -95,19 +97,6 @@ def _kept(
 ) -> list[dict[str, Any]]:
     kept = []
     for number, record in enumerate(records, start=1):
-        content = write_record_parquet(record)
-        digest = files.put(content, "parquet")
-        row = means_row(record)
-        kept.append(
-            {
-                "means": asdict(row),
-                "record": {
-                    "digest": digest,
-                    "samples": len(record.t_s),
-                    "duration_s": row.duration_s,
-                    "rate_hz": row.rate_hz,
-                },
-            }
-        )
+        kept.append(keep_record(files, record))
         report(until * number / len(records), "storing records")
     return kept

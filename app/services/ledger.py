@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from app.errors import Problem
+from app.errors import AppError, Problem
 from app.jobs.ledger import Task
 from app.jobs.problems import given_up
 from app.services import calibrations, ingest, simulations
@@ -63,7 +63,16 @@ class JobLedger:
                 row.progress, row.phase = fraction, phase
 
     def succeed(self, job_id: str, output: Mapping[str, Any]) -> None:
-        """Keep a job's answer; a job that has ended meanwhile keeps its end."""
+        """Keep a job's answer; a job that has ended meanwhile keeps its end.
+
+        An answer that cannot be kept, positions that are not certified, say, fails the job.
+        """
+        try:
+            self._keep(job_id, output)
+        except AppError as error:
+            self.fail(job_id, error.problems)
+
+    def _keep(self, job_id: str, output: Mapping[str, Any]) -> None:
         with self._lab.write(SYSTEM) as work:
             row = _open_job(work, job_id)
             if row is None:

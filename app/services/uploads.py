@@ -14,12 +14,13 @@ from app.errors import Invalid, problem
 from app.exchange.archive import ZipFiles
 from app.exchange.certificate import write_certificate_csv
 from app.exchange.items import read_item
-from app.exchange.records import means_row, read_record, write_record_parquet
-from app.exchange.rows import CertificateRow, CurrentRecord, Facts
+from app.exchange.records import read_record
+from app.exchange.rows import CertificateRow, Facts
 from app.exchange.session_folder import SessionFiles
 from app.exchange.session_json import FILE_NAME, read_session_json
 from app.services import calibrations, ingest, sessions, stands
-from app.services.ingest import Measured, Saved, Source, StoredRecord, source_suffix
+from app.services.ingest import Measured, Saved, Source, measured_item, source_suffix
+from app.services.keeping import keep_record
 from app.services.lab import Work
 from app.services.sessions import NewSession
 from app.services.views import JobView, SessionView
@@ -85,13 +86,13 @@ def keep_position(
             )
         )
     source = Source("upload", files.put(content, source_suffix(name)), name)
-    return _kept(files, records[0], source), warnings
+    return measured_item(keep_record(files, records[0]), source), warnings
 
 
 def kept_item(files: RecordFiles, item: SessionFiles, source: Source) -> Iterator[Measured]:
     """Keep an item's records one by one; the means given for further positions come after them."""
     for record in item.records:
-        yield _kept(files, record, source)
+        yield measured_item(keep_record(files, record), source)
     for row in item.measured()[len(item.records) :]:
         yield Measured(replace(row, line=None), source)
 
@@ -144,13 +145,6 @@ def brought_before(work: Work, session_id: int) -> BroughtIn:
     found = sessions.detail(work, session_id)
     saved = tuple(Saved(item, new=False) for item in found.revisions)
     return BroughtIn(found.session, saved, found.session.job, ())
-
-
-def _kept(files: RecordFiles, record: CurrentRecord, source: Source) -> Measured:
-    row = means_row(record)
-    digest = files.put(write_record_parquet(record), "parquet")
-    stored = StoredRecord(digest, len(record.t_s), row.duration_s or 0.0, row.rate_hz or 0.0)
-    return Measured(row, source, stored)
 
 
 def _looked_at(path: Path, name: str) -> tuple[int, Facts]:

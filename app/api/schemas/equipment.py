@@ -68,7 +68,13 @@ class CertificatePosition(Incoming, Outgoing):
     u_gamma_arcsec: NotNegative | None = None
 
 
-_POSITION: JsonDict = {"theta_deg": 0, "psi_deg": 0, "alpha_arcsec": 6.9, "beta_arcsec": 16.4, "gamma_arcsec": 6.6}
+_POSITION: JsonDict = {
+    "theta_deg": 0,
+    "psi_deg": 0,
+    "alpha_arcsec": 6.9,
+    "beta_arcsec": 16.4,
+    "gamma_arcsec": 6.6,
+}
 
 
 class NewCertificate(Incoming):

@@ -81,7 +81,7 @@ class NewMeans(Incoming):
     rate_hz: Positive | None = None
     started_at: Moment | None = None
     temperature_c: Celsius | None = None
-    repeat: Repeat = 0
+    repeat: Repeat | None = None
     note: Text = ""
 
 
