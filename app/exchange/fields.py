@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from decimal import Decimal
-from math import isinf, nan
+from math import nan
 from typing import Final
 
 from app.exchange.headers import Column
-from app.exchange.numbers import exact_in, overflow, read_decimal, shifted
+from app.exchange.numbers import LARGEST, exact_in, overflow, read_decimal, shifted
 from app.exchange.problems import Problems
 from app.exchange.table import Table
 from solver.errors import Message
@@ -87,7 +87,7 @@ def _decimals(
 
 def _rounded(value: Decimal, column: Column, problems: Problems, row: int) -> float:
     result = shifted(value, column.unit or "", column.lab_unit or "")
-    if isinf(result):
+    if abs(result) > LARGEST:
         problems.note(overflow(str(value)), row=row, column=column.name)
         return nan
     return result

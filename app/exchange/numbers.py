@@ -16,6 +16,9 @@ from app.errors import Invalid, Problem
 from solver.errors import Message
 
 _LONGEST = 1000
+LARGEST: Final = 1e12
+"""No quantity of a file is larger in the laboratory's unit; it keeps sums and squares finite."""
+
 _LARGEST_EXPONENT = 400  # beyond binary64 in every unit; keeps exact fractions short
 
 _MINUSES: Final = dict.fromkeys(map(ord, "\u2010\u2011\u2012\u2013\u2212\ufe63\uff0d"), "-")
@@ -117,9 +120,9 @@ def _complaint(plain: str, *, comma: bool) -> Message:
 
 
 def overflow(text: str) -> Message:
-    """What to say about a number beyond binary64."""
+    """What to say about a number that nothing measured here can have."""
     return Message(
-        "too-large", "“%(text)s” is too large for a number. Check its exponent.", {"text": text[:40]}
+        "too-large", "“%(text)s” is too large. Check its exponent and its unit.", {"text": text[:40]}
     )
 
 

@@ -6,6 +6,7 @@ rescaled silently. One row that is a thousand times off the others of its file i
 """
 
 from collections.abc import Sequence
+from math import floor, log10
 from statistics import median
 from typing import Final
 
@@ -22,6 +23,7 @@ USUAL_MA: Final = ma_from_ampere(EARTH_RATE / _USUAL_SCALE)
 
 _HALF_WAY: Final = 1000.0**0.5
 _SLIP: Final = 1000.0
+_RANGES: Final = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 5.0)
 _FEWEST: Final = 4  # rows from which "the others" can be told
 
 
@@ -42,13 +44,23 @@ def current_unit(rows: Sequence[MeansRow], columns: dict[str, Column], problems:
 def _check_too_large(
     rows: Sequence[MeansRow], sizes: Sequence[float], columns: dict[str, Column], problems: Problems
 ) -> None:
-    """A current above a hundred times the median that fits the others once divided by 1000."""
+    """A current above a hundred times the median that fits the others once divided by 1000.
+
+    An ammeter's range is a round number: a current that lies on one is saturated, which the
+    diagnosis of the fit tells, and is let through.
+    """
     usual = median(sizes)
     others = [size for size in sizes if size <= 100.0 * usual]
     for row in rows:
         for name, value in (("jx", row.jx_ma), ("jy", row.jy_ma)):
-            if abs(value) > 100.0 * usual and abs(value) / _SLIP <= 3.0 * max(others):
+            large = abs(value) > 100.0 * usual and abs(value) / _SLIP <= 3.0 * max(others)
+            if large and not _is_a_range(abs(value)):
                 problems.note(_slipped("large", value), row=row.line, column=columns[name].name)
+
+
+def _is_a_range(value: float) -> bool:
+    leading = value / 10.0 ** floor(log10(value) + 1e-9)
+    return any(abs(leading - mark) < 1e-6 for mark in _RANGES)
 
 
 def _check_too_small(
@@ -60,7 +72,7 @@ def _check_too_small(
     the Earth's, at a pole).
     """
     smallest, next_one = sorted(sizes)[:2]
-    fits = 0.1 * median(sizes) <= smallest * _SLIP <= 3.0 * max(sizes)
+    fits = next_one / 3.0 <= smallest * _SLIP <= 3.0 * max(sizes)
     if fits and smallest < next_one / 30.0:
         row = rows[list(sizes).index(smallest)]
         problems.note(_slipped("small", smallest), row=row.line, column=columns["jx"].name)

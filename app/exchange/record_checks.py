@@ -134,7 +134,7 @@ def _resting(values: Array, rate: float, lines: Sequence[int], place: dict[str, 
 
 def _runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Starts and lengths of the runs of equal values."""
-    starts = np.concatenate(([0], np.flatnonzero(np.diff(values) != 0) + 1))
+    starts = np.concatenate(([0], np.flatnonzero(values[1:] != values[:-1]) + 1))
     return starts, np.diff(np.append(starts, len(values)))
 
 

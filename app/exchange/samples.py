@@ -2,7 +2,7 @@
 
 Texts are parsed by pyarrow, which rounds correctly, as Python's float() does. A shift by a power of
 ten is done on the text (``0.004536`` becomes ``0.004536e3``), so it is exact too. Whatever does not
-go that way, or is not finite, is read cell by cell, where every problem gets its row.
+go that way, or is not finite or is absurdly large, is read cell by cell, where every problem gets its row.
 """
 
 from typing import Any
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from app.exchange import fields
 from app.exchange.fields import full_turn
 from app.exchange.headers import Column
-from app.exchange.numbers import overflow, power_of_ten, read_decimal, shifted
+from app.exchange.numbers import LARGEST, overflow, power_of_ten, read_decimal, shifted
 from app.exchange.problems import Problems
 from app.exchange.table import Table, texts_of
 from solver.errors import Message
@@ -35,7 +35,7 @@ def samples(table: Table, column: Column, problems: Problems) -> Array:
     values = _vectorised(table.columns[column.name], power_of_ten(unit, lab_unit), comma=table.comma)
     if values is None:
         return _cell_by_cell(table, column, range(len(table)), np.empty(len(table)), problems)
-    wrong = np.flatnonzero(~np.isfinite(values))
+    wrong = np.flatnonzero(~(np.abs(values) <= LARGEST))
     return _cell_by_cell(table, column, wrong, values, problems) if len(wrong) else values
 
 
@@ -80,7 +80,7 @@ def _cell_by_cell(table: Table, column: Column, places: Any, values: Array, prob
             problems.note(number, row=table.lines[place], column=column.name)
             continue
         value = shifted(number, column.unit or "", column.lab_unit or "")
-        if np.isfinite(value):
+        if abs(value) <= LARGEST:
             values[place] = value
         else:
             problems.note(overflow(text), row=table.lines[place], column=column.name)

@@ -113,6 +113,8 @@ REFUSED = [
           "duplicate-position", 3,
           "repeat"),
     means("a number beyond float64", lines(MEANS, l2="0,0,1e309,0.004536"), "too-large", 2, "jx_ma"),
+    means("a number beyond reason", lines(MEANS, l2="0,0,1.1e12,0.004536"), "too-large", 2, "jx_ma"),
+    Case("a sample beyond reason", read_record, lines(RECORD, l777="3.875,1e200,0.001"), "too-large", 777, "jx_ma"),
     Case("a position certified twice", read_certificate, lines(CERTIFICATE, l3="360,-360,1,1,1,1,1,1"),
          "duplicate-position", 3, "theta_deg", "row 2"),
     Case("a negative uncertainty", read_certificate, lines(CERTIFICATE, l3="0,90,1,1,1,1,-1,1"),
