@@ -17,10 +17,13 @@ from app.pages import (
     assets,
     certificates,
     choices,
+    entry,
     errors,
     gyros,
     jobs,
     method,
+    results,
+    sessions,
     sign_in,
     simulations,
     stands,
@@ -33,7 +36,7 @@ __all__ = ["errors", "mount", "router"]
 
 router = APIRouter(include_in_schema=False)
 for _noun in (
-    today, gyros, types, stands, certificates, simulations, jobs, method, sign_in, choices, assets,
+    today, sessions, entry, results, gyros, types, stands, certificates, simulations, jobs, method, sign_in, choices, assets,
 ):  # fmt: skip
     router.include_router(_noun.router)
 

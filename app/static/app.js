@@ -1,93 +1,97 @@
-// Driftbook in the browser: charts, and the notice when a live connection is lost. Pages work without it.
+// Driftbook in the browser: charts, pasting into tables, live connections. Pages work without it.
 "use strict";
 
 (() => {
   // ---------------------------------------------------------------- charts
-  // A specification names colours as var(--series-1) and the like, so the theme changes them by itself.
-  const css = (name) => `var(--${name})`;
-  const config = () => {
-    const style = getComputedStyle(document.documentElement);
-    const font = style.getPropertyValue("--sans").trim();
-    const size = 0.75 * parseFloat(style.fontSize);
-    const text = { labelFont: font, titleFont: font, labelFontSize: size, titleFontSize: size };
-    return {
-      background: null, font, padding: 0,
-      view: { stroke: null },
-      axis: { ...text, labelColor: css("ink-2"), titleColor: css("ink-2"), titleFontWeight: 400, domain: false,
-              ticks: false, gridColor: css("hair"), labelPadding: 6, titlePadding: 8 },
-      axisX: { grid: false, domain: true, domainColor: css("edge"), ticks: true, tickColor: css("edge"), tickSize: 4 },
-      legend: { ...text, labelColor: css("ink-2"), titleColor: css("ink-2"), titleFontWeight: 400, symbolStrokeWidth: 1.5 },
-      title: { font, fontSize: size, color: css("ink-2"), fontWeight: 400, anchor: "start" },
-      header: { ...text, labelColor: css("ink-2"), titleColor: css("ink-2") },
-      text: { font, fontSize: size, color: css("ink") },
-      line: { strokeWidth: 1.5 }, rule: { strokeWidth: 1 }, point: { size: 50 },
-    };
-  };
-  const options = () => ({
-    ast: true, actions: false, defaultStyle: false, renderer: "svg",
-    tooltip: { disableDefaultStyle: true }, config: config(),
-  });
+  // A specification brings its own look; colours are var(--series-1) and the like, so the theme changes them.
+  const options = { ast: true, actions: false, defaultStyle: false, renderer: "svg", tooltip: { disableDefaultStyle: true } };
+  const charts = new WeakMap();
 
-  const drawn = new WeakMap();
-
-  const specification = async (element) => {
-    const given = element.dataset.chart;
+  const specification = async (given) => {
     if (given.startsWith("{")) return JSON.parse(given);
     const answer = await fetch(given, { headers: { accept: "application/json" } });
     if (!answer.ok) throw new Error(`${given}: ${answer.status}`);
     return answer.json();
   };
 
+  // Drawn anew for every width, never scaled: text keeps its size.
   const draw = async (element) => {
     const width = Math.floor(element.clientWidth);
-    const known = drawn.get(element);
-    if (!width || (known && known.width === width)) return;
-    const spec = known ? known.spec : await specification(element);
-    drawn.set(element, { spec, width, view: known && known.view });
-    const inner = document.createElement("div");
-    const result = await window.vegaEmbed(inner, { ...spec, width, autosize: { type: "fit-x", contains: "padding", resize: false } }, options());
-    if (known && known.view) known.view.finalize();
-    drawn.set(element, { spec, width, view: result.view });
-    element.replaceChildren(inner);
+    const chart = charts.get(element);
+    if (!width || chart.width === width) return;
+    chart.width = width;
+    chart.spec ||= await specification(element.dataset.chart);
+    if (chart.width !== width) return;
+    const place = document.createElement("div");
+    const { view } = await window.vegaEmbed(place, { ...chart.spec, width }, options);
+    chart.view?.finalize();
+    chart.view = view;
+    element.replaceChildren(place);
     element.dataset.ready = "";
   };
 
-  const safely = (element) => draw(element).catch((error) => {
-    element.dataset.failed = "";
+  const drawSafely = (element) => draw(element).catch((error) => {
+    for (const notice of element.querySelectorAll("[data-undrawn]")) notice.hidden = false;
     console.error(error);
   });
 
-  const resized = window.ResizeObserver && new ResizeObserver((entries) => {
-    for (const entry of entries) safely(entry.target);
-  });
+  const resized = new ResizeObserver((entries) => entries.forEach((entry) => drawSafely(entry.target)));
 
   const mount = (root) => {
     if (!window.vegaEmbed) return;
-    const charts = [...root.querySelectorAll("[data-chart]")];
-    if (root.matches && root.matches("[data-chart]")) charts.push(root);
-    for (const element of charts) resized ? resized.observe(element) : safely(element);
-  };
-
-  // ------------------------------------------------------------ live pages
-  // <p data-lost hidden> inside an element with sse-connect is shown while the connection is down.
-  const tell = (lost) => (event) => {
-    for (const notice of event.target.querySelectorAll("[data-lost]")) notice.hidden = !lost;
-  };
-
-  // Ages: <time data-age datetime="…"> says how long ago, in the page's language.
-  const units = [[86400, "day"], [3600, "hour"], [60, "minute"], [1, "second"]];
-  const grow = () => {
-    const words = new Intl.RelativeTimeFormat(document.documentElement.lang, { style: "short", numeric: "always" });
-    for (const element of document.querySelectorAll("time[data-age]")) {
-      const seconds = Math.max(0, (Date.now() - Date.parse(element.dateTime)) / 1000);
-      const [size, unit] = units.find(([size]) => seconds >= size) || units[3];
-      element.textContent = words.format(-Math.floor(seconds / size), unit);
+    for (const element of [root, ...root.querySelectorAll("[data-chart]")]) {
+      if (!element.dataset?.chart || charts.has(element)) continue;
+      charts.set(element, {});
+      resized.observe(element);
     }
   };
 
+  // --------------------------------------------------------------- pasting
+  // Cells of a spreadsheet pasted into a field of <table data-paste> fill the fields to its right and below.
+  const paste = (event) => {
+    const field = event.target.closest?.("table[data-paste] input");
+    const text = event.clipboardData?.getData("text/plain") ?? "";
+    if (!field || !/[\t\n]/.test(text.trim())) return;
+    event.preventDefault();
+    const inputs = (row) => [...row.querySelectorAll("input:not([type=hidden], :disabled, [readonly])")];
+    const rows = [...field.closest("table").querySelectorAll("tbody tr")].filter((row) => inputs(row).length);
+    const top = rows.indexOf(field.closest("tr"));
+    const left = inputs(rows[top]).indexOf(field);
+    text.replace(/[\r\n]+$/, "").split(/\r?\n/).forEach((line, down) => {
+      const fields = rows[top + down] ? inputs(rows[top + down]) : [];
+      line.split("\t").forEach((cell, right) => {
+        const target = fields[left + right];
+        if (!target) return;
+        target.value = cell.trim();
+        target.dispatchEvent(new Event("input", { bubbles: true }));
+        target.dispatchEvent(new Event("change", { bubbles: true }));
+      });
+    });
+  };
+
+  // ------------------------------------------------------------ live pages
+  // An element with data-lost inside one with sse-connect is shown while the connection is down.
+  const tell = (lost) => (event) => {
+    for (const notice of event.target.querySelectorAll?.("[data-lost]") ?? []) notice.hidden = !lost;
+  };
+
+  // A browser has six connections to a server: a page that nobody sees gives its own back.
+  const pause = () => {
+    for (const element of document.querySelectorAll("[sse-connect]")) {
+      if (document.hidden) {
+        window.htmx.trigger(element, "htmx:beforeCleanupElement");
+      } else {
+        const fresh = element.cloneNode(true);
+        element.replaceWith(fresh);
+        window.htmx.process(fresh);
+      }
+    }
+  };
+
+  document.addEventListener("paste", paste);
+  document.addEventListener("visibilitychange", pause);
   document.addEventListener("DOMContentLoaded", () => {
     mount(document);
-    setInterval(grow, 1000);
     document.body.addEventListener("htmx:load", (event) => mount(event.detail.elt));
     document.body.addEventListener("htmx:sseError", tell(true));
     document.body.addEventListener("htmx:sseOpen", tell(false));
