@@ -201,14 +201,13 @@ def test_warned_with_file_and_cure(case: Case) -> None:
     assert case.says in warning.text
 
 
-@pytest.mark.parametrize("name", ["means", "certificate", "record"])
-def test_what_is_in_order_has_neither_problem_nor_warning(name: str) -> None:
-    text, read = {
-        "means": (MEANS, read_means),
-        "certificate": (CERTIFICATE, read_certificate),
-        "record": (RECORD, read_record),
-    }[name]
-    _, warnings = read(text.encode(), FILE)  # type: ignore[operator]
+@pytest.mark.parametrize(
+    ("text", "read"),
+    [(MEANS, read_means), (CERTIFICATE, read_certificate), (RECORD, read_record)],
+    ids=["means", "certificate", "record"],
+)
+def test_what_is_in_order_has_neither_problem_nor_warning(text: str, read: Reader) -> None:
+    _, warnings = read(text.encode(), FILE)
     assert warnings == []
 
 
