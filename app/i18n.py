@@ -1,12 +1,8 @@
 """English and Russian: the language of a request, and every sentence in it.
 
 The English text is the key; translations stand in ``app/locales/<language>/LC_MESSAGES/driftbook.po``
-and are read at the start as they are, with no compiled file. After changing a text, refresh the
-catalogue from the folder of the project, then translate what is new::
-
-    pybabel extract -F app/locales/babel.cfg -k "problem:2 refuse:2 Message:2 marked" -o new.pot . &&
-    pybabel update -D driftbook -d app/locales -l ru -i new.pot --no-fuzzy-matching --ignore-obsolete &&
-    rm new.pot
+and are read at the start as they are, with no compiled file. After changing a text run
+``python -m app.catalogue`` and translate what it names.
 
 The language is a context variable. `app.pages` sets it for each request in pure ASGI middleware: set
 in a synchronous dependency it would be lost with the copied context of that thread.
@@ -48,8 +44,13 @@ class Sentence(Protocol):
         """What the placeholders stand for."""
 
 
+def po_file(language: str) -> Path:
+    """The file of a language's translations."""
+    return _FOLDER / language / "LC_MESSAGES" / f"{DOMAIN}.po"
+
+
 def _catalogue(language: str) -> NullTranslations:
-    path = _FOLDER / language / "LC_MESSAGES" / f"{DOMAIN}.po"
+    path = po_file(language)
     if not path.exists():
         return NullTranslations()
     compiled = io.BytesIO()
