@@ -126,7 +126,8 @@ def _about_measurement(observations: Observations) -> list[Message]:
 
 def _about_fit(estimate: Estimate, observations: Observations) -> list[Message]:
     warnings = []
-    if estimate.uncertainty_basis == "scatter" and observations.u_jx is None:
+    untold = observations.u_jx is None or observations.u_jy is None
+    if untold and estimate.uncertainty_basis == "scatter":
         warnings.append(
             Message(
                 "no-uncertainty",
@@ -134,7 +135,7 @@ def _about_fit(estimate: Estimate, observations: Observations) -> list[Message]:
                 "scatter of the residuals, and the fit cannot be tested.",
             )
         )
-    if estimate.uncertainty_basis == "none" and observations.u_jx is None:
+    if untold and estimate.uncertainty_basis == "none":
         warnings.append(
             Message(
                 "no-uncertainty",

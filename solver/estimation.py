@@ -17,7 +17,7 @@ from solver.constants import EARTH_RATE
 from solver.error_model import Equations, rate_covariance, scale_matrix
 from solver.errors import Message, NotConverged, SolverError
 from solver.fit_quality import judge
-from solver.least_squares import LinearSolution, solve
+from solver.least_squares import LinearSolution, estimate, solve
 from solver.observability import Invisible, find_invisible, names, natural_scale, unobservable
 from solver.records import Array, Estimate, Fit, Method, Observations, UncertaintyBasis
 from solver.units import deg_per_h_from_rad_per_s
@@ -64,12 +64,11 @@ def least_squares_estimate(equations: Equations) -> Estimate:
 
 
 def _rough(design: Array, right_side: Array, invisible: Invisible) -> Array:
-    """Parameters good enough to weight by, (8,): normal equations where nothing is invisible."""
+    """Parameters to weight by, (8,)."""
+    if not len(invisible.directions):
+        return estimate(design, right_side)[0]
     scale = natural_scale(design)
-    if len(invisible.directions):
-        return solve(design, right_side, scale=scale, invisible=invisible.directions).values
-    scaled = design / scale
-    return np.asarray(np.linalg.solve(scaled.T @ scaled, scaled.T @ right_side) / scale)
+    return solve(design, right_side, scale=scale, invisible=invisible.directions).values
 
 
 def paper_estimate(equations: Equations, observations: Observations) -> Estimate:

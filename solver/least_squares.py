@@ -3,6 +3,7 @@
 `solve` factorises one problem, already whitened (unit variance of every row), by the singular value
 decomposition of the column-scaled design: it gives the estimate, the covariance and the *gain*
 ``H`` with ``values = H @ right_side``, whose product with the noise is the estimate's error.
+`estimate` gives only answer and covariance, by QR.
 
 `solve_batch` takes many problems. With columns scaled to unit length, G is the normal matrix and
 C = G⁻¹ the covariance in scaled parameters; the squared condition number of the design, κ², is at
@@ -19,6 +20,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from scipy.linalg import lapack
 
 from solver.records import Array
 
@@ -98,6 +100,43 @@ def solve(
         root = (vh.T / s) / scale[:, None]
     gain = root @ u.T
     return LinearSolution(gain @ right_side, root @ root.T, gain, *spectrum)
+
+
+def estimate(design: Array, right_side: Array) -> tuple[Array, Array]:
+    """Solve one problem for its answer and covariance alone, as fast as one can be solved.
+
+    QR of the scaled design with the right side as a further column: R and Qᵀ·y at once.
+
+    Parameters
+    ----------
+    design : (m, p) array
+        Rows of unit variance.
+    right_side : (m,) array
+
+    Returns
+    -------
+    values : (p,) array
+    covariance : (p, p) array
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        When the design has not full column rank.
+    """
+    rows, columns = design.shape
+    scale = column_scale(design)
+    both = np.empty((rows, columns + 1), order="F")
+    np.divide(design, scale, out=both[:, :columns])
+    both[:, columns] = right_side
+    factored = lapack.dgeqrf(both, overwrite_a=True)[0]
+    if rows < columns or np.abs(factored.diagonal()[:columns]).min() <= rows * _EPS:
+        raise np.linalg.LinAlgError(_DEFICIENT)
+    # R⁻¹·[1, Qᵀ·y]
+    identity_and_side = np.eye(columns, columns + 1, order="F")
+    identity_and_side[:, columns] = factored[:columns, columns]
+    solved = lapack.dtrtrs(factored[:columns, :columns], identity_and_side, overwrite_b=True)[0]
+    root = solved[:, :columns] / scale[:, None]
+    return solved[:, columns] / scale, root @ root.T
 
 
 def _pad(design: Array) -> Array:

@@ -156,11 +156,11 @@ def _hidden_currents(currents: Array, noise: Array, basis: Array | None, scale: 
     rounded = w[s <= _ROUNDING]
     if not noise.any():
         return rounded
-    factor = np.linalg.cholesky(_noise_gram(noise, basis)) / scale[:4, None]
-    _, in_noise, w = _small_svd(_triangle(np.asarray(np.linalg.solve(factor, currents.T).T, np.float64)))
+    unit = np.asarray(np.linalg.inv(np.linalg.cholesky(_noise_gram(noise, basis))) * scale[:4], np.float64)
+    _, in_noise, w = _small_svd(_triangle(currents @ unit.T))
     count = len(currents)
     buried = w[in_noise < max(CLEAR_OF_NOISE, _SHRUNK_BY_U * (count - 8) / np.sqrt(count))]
-    return np.linalg.solve(factor.T, buried.T).T if len(buried) >= len(rounded) else rounded
+    return buried @ unit if len(buried) >= len(rounded) else rounded
 
 
 def _noise_gram(noise: Array, basis: Array | None) -> Array:

@@ -175,7 +175,8 @@ class Estimate:
         `uncertainty_basis` is ``none``.
     uncertainty_basis
         ``given``: from u(J) as stated; ``scatter``: from the residuals' scatter; ``none``: neither
-        is possible (no degree of freedom left).
+        is possible (no degree of freedom left, or the scale factors, by which the currents' noise
+        becomes that of the rates, are not determined).
     residuals : (n, 2) array
         Right side minus left side of the observation equations, x and y, rad/s, per row of the
         observations (all of them, also those that the method does not use).

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.least_squares import AGREEMENT, complement, solve, solve_batch
+from solver.least_squares import AGREEMENT, complement, estimate, solve, solve_batch
 
 
 @pytest.fixture
@@ -19,6 +19,23 @@ def test_agrees_with_lstsq_and_the_textbook_covariance(problem):
     np.testing.assert_allclose(solution.values, expected, rtol=1e-12)
     np.testing.assert_allclose(solution.gain @ right_side, expected, rtol=1e-12)
     np.testing.assert_allclose(solution.covariance @ (design.T @ design), np.eye(5), rtol=0, atol=1e-6)
+
+
+def test_the_lean_solution_is_the_same(problem):
+    values, covariance = estimate(*problem)
+    expected = solve(*problem)
+    np.testing.assert_allclose(values, expected.values, rtol=1e-12)  # as above
+    u = np.sqrt(np.diagonal(expected.covariance))
+    np.testing.assert_allclose(covariance / np.outer(u, u), expected.covariance / np.outer(u, u), atol=1e-12)
+
+
+@pytest.mark.parametrize("columns", [[0, 0], [0, 1, 2, 3, 4, 1]])
+def test_the_lean_solution_refuses_a_deficient_design(columns, problem):
+    design, right_side = problem
+    with pytest.raises(np.linalg.LinAlgError):
+        estimate(design[:, columns], right_side)
+    with pytest.raises(np.linalg.LinAlgError):
+        estimate(design[:3], right_side[:3])
 
 
 def test_spectrum_is_that_of_the_scaled_design(problem):
