@@ -12,7 +12,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import Scope
 
-from app import api, pages
+from app import api, logs, pages
 from app.errors import AppError, Forbidden, problem
 from app.jobs.engine import JobEngine
 from app.middleware import BodyLimit, LastResort, RequestLog, SameSite, SecurityHeaders
@@ -48,6 +48,7 @@ def create_app(settings: Settings, opening: Opening = working_lab) -> FastAPI:
     opening
         How the laboratory is opened; while the service runs it is ``app.state.lab``.
     """
+    logs.configure()
     service = api.create()
 
     @asynccontextmanager

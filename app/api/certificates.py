@@ -48,7 +48,7 @@ class Heading(Incoming):
     openapi_extra=body_of("text/csv", model="NewCertificate"),
 )
 def add(
-    name: str,
+    name: Name,
     caller: Uploader,
     heading: Annotated[Heading, Query()],
     body: WholeBody,
@@ -88,7 +88,7 @@ def _from_file(body: bytes, heading: Heading, request: Request) -> tuple[NewCert
     response_model=Listing[CertificateHead],
     responses=CSV_TOO | {404: {}},
 )
-def listing(name: str, part: Annotated[Part, Query()], caller: Reader, request: Request) -> Response:
+def listing(name: Name, part: Annotated[Part, Query()], caller: Reader, request: Request) -> Response:
     """Certificates of a stand, the newest first."""
     with caller.read() as work:
         found, following = cut(stands.certificates(work, name), part, lambda item: item.number)
@@ -96,7 +96,7 @@ def listing(name: str, part: Annotated[Part, Query()], caller: Reader, request: 
 
 
 @router.get("/stands/{name}/certificates/{number}", response_model=Certificate, responses=CSV_TOO | {404: {}})
-def detail(name: str, number: str, caller: Reader, request: Request) -> Response | Certificate:
+def detail(name: Name, number: Name, caller: Reader, request: Request) -> Response | Certificate:
     """One certificate; as CSV it is the file of its positions."""
     with caller.read() as work:
         found = stands.certificate(work, name, number)

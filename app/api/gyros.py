@@ -50,14 +50,14 @@ def listing(part: Annotated[GyroPart, Query()], caller: Reader, request: Request
 
 
 @router.get("/gyros/{serial}", responses={404: {}})
-def detail(serial: str, caller: Reader) -> Gyro:
+def detail(serial: Name, caller: Reader) -> Gyro:
     """One gyro."""
     with caller.read() as work:
         return Gyro.model_validate(gyros.gyro(work, serial))
 
 
 @router.patch("/gyros/{serial}", responses={404: {}})
-def change(serial: str, body: GyroChange, caller: Uploader) -> Gyro:
+def change(serial: Name, body: GyroChange, caller: Uploader) -> Gyro:
     """Correct a gyro's type or note."""
     with caller.write() as work:
         return Gyro.model_validate(gyros.change_gyro(work, serial, type_name=body.type, note=body.note))

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from app.api.auth import Reader
 from app.api.pagination import CSV_TOO, wants_csv
-from app.api.schemas.common import Incoming, OptionalText, Since, Until
+from app.api.schemas.common import Incoming, Name, OptionalText, Since, Until
 from app.api.schemas.results import History
 from app.exchange.written import csv_bytes
 from app.services import history
@@ -30,7 +30,7 @@ class Period(Incoming):
 
 @router.get("/gyros/{serial}/history", response_model=History, responses=CSV_TOO | {404: {}})
 def over_time(
-    serial: str, period: Annotated[Period, Query()], caller: Reader, request: Request
+    serial: Name, period: Annotated[Period, Query()], caller: Reader, request: Request
 ) -> Response | History:
     """One parameter, or each of them, over time with the type's limits; also as CSV."""
     with caller.read() as work:

@@ -99,4 +99,4 @@ def put_currents(
         saved = ingest.save(work, session_id, [measured])[0]
     response.status_code = 201 if saved.new else 200
     shown = Measurement.model_validate(saved.measurement)
-    return MeasuredRecord.model_validate(shown.model_dump(by_alias=False) | {"warnings": warned(warnings)})
+    return MeasuredRecord.model_validate(dict(shown) | {"warnings": warned(warnings)})

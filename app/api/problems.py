@@ -138,7 +138,9 @@ def _location(place: tuple[int | str, ...]) -> Json:
 
 
 def _pointer(path: Iterable[int | str]) -> str:
-    return "#" + "".join("/" + str(step).replace("~", "~0").replace("/", "~1") for step in path)
+    steps = (str(step).replace("~", "~0").replace("/", "~1") for step in path)
+    # JSON can write half a surrogate pair, UTF-8 cannot.
+    return "#" + "".join(f"/{step}" for step in steps).encode("utf-8", "replace").decode()
 
 
 def _sentence(error: Json) -> str:

@@ -7,6 +7,7 @@ from fastapi import APIRouter, Query, Request, Response
 from app.api import links
 from app.api.auth import Reader, Uploader
 from app.api.pagination import CSV_TOO, Columns, Listing, Part, cut, listed
+from app.api.schemas.common import Name
 from app.api.schemas.equipment import NewStand, Stand
 from app.services import stands
 
@@ -42,7 +43,7 @@ def listing(part: Annotated[Part, Query()], caller: Reader, request: Request) ->
 
 
 @router.get("/stands/{name}", responses={404: {}})
-def detail(name: str, caller: Reader) -> Stand:
+def detail(name: Name, caller: Reader) -> Stand:
     """One stand."""
     with caller.read() as work:
         return Stand.model_validate(stands.stand(work, name))

@@ -19,7 +19,7 @@ class Incoming(BaseModel):
 class Outgoing(BaseModel):
     """Something we answer, read from a view of the services."""
 
-    model_config = ConfigDict(from_attributes=True)
+    model_config = ConfigDict(from_attributes=True, validate_by_name=True, validate_by_alias=True)
 
 
 def _only_text(value: Any) -> Any:
@@ -64,7 +64,7 @@ Positive = Annotated[float, Field(strict=True, gt=0)]
 NotNegative = Annotated[float, Field(strict=True, ge=0)]
 Angle = Annotated[float, Field(strict=True, ge=-720, le=720)]
 PathAngle = Annotated[float, Field(ge=-720, le=720, allow_inf_nan=False)]
-Name = Annotated[str, StringConstraints(min_length=1, max_length=100)]
+Name = Annotated[str, StringConstraints(min_length=1, max_length=100, pattern=r"^[^\x00]*$")]
 Text = Annotated[str, StringConstraints(max_length=4000, pattern=r"^[^\x00]*$")]
 Day = Annotated[date, BeforeValidator(_day)]
 Moment = Annotated[datetime, AfterValidator(_in_utc), BeforeValidator(_only_text)]
