@@ -30,7 +30,7 @@ def write_case(folder, places, latitude_deg, truth, spread_arcsec, shuffle=False
     The case is turned by θ about east, ψ about its own third axis, then α, β, γ about its own axes
     (intrinsic turns); a vector's case components are those of the inverse rotation.
     """
-    folder.mkdir(parents=True)
+    folder.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(11)
     angles = np.round(rng.normal(0, spread_arcsec, (len(places), 3)), 3)
     turns = Rotation.from_euler("XZ", places, degrees=True) * Rotation.from_euler(
