@@ -36,7 +36,8 @@ __all__ = ["errors", "mount", "router"]
 
 router = APIRouter(include_in_schema=False)
 for _noun in (
-    today, sessions, entry, results, gyros, types, stands, certificates, simulations, jobs, method, sign_in, choices, assets,
+    today, sessions, entry, results, gyros, types, stands, certificates, simulations, jobs, method, sign_in,
+    choices, assets,
 ):  # fmt: skip
     router.include_router(_noun.router)
 

@@ -76,7 +76,7 @@ def _template() -> Spec:
     )
     y = alt.Y(
         "v:Q",
-        scale=alt.Scale(type="log", domainMin=alt.ExprRef("low"), domainMax=alt.ExprRef("high"), nice=False),
+        scale=alt.Scale(type="log", domain=[alt.ExprRef("low"), alt.ExprRef("high")], nice=False),
         axis=alt.Axis(
             title=None, minExtent=36, maxExtent=36, tickCount=6,
             labelExpr="'10' + " + _SUPERSCRIPT,

@@ -136,7 +136,7 @@ def _template(with_dates: bool) -> Spec:
         tickSize=4,
     )
     x_scale = alt.Scale(type="time", domain=[alt.ExprRef("first"), alt.ExprRef("last")], nice=False)
-    y_scale = alt.Scale(domainMin=alt.ExprRef("low"), domainMax=alt.ExprRef("high"), nice=False, zero=False)
+    y_scale = alt.Scale(domain=[alt.ExprRef("low"), alt.ExprRef("high")], nice=False, zero=False)
     y_axis = alt.Axis(title=None, minExtent=_AXIS_PX, maxExtent=_AXIS_PX, tickCount=4)
 
     def rows(name: str) -> Any:

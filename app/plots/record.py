@@ -66,7 +66,7 @@ def _template(channel: str) -> Spec:
 
     colour = theme.colour("series-1" if channel == "x" else "series-2")
     x_scale = alt.Scale(domain=[alt.ExprRef("first"), alt.ExprRef("last")], nice=False, zero=False)
-    y_scale = alt.Scale(domainMin=alt.ExprRef("low"), domainMax=alt.ExprRef("high"), nice=False, zero=False)
+    y_scale = alt.Scale(domain=[alt.ExprRef("low"), alt.ExprRef("high")], nice=False, zero=False)
     x_axis = alt.Axis(title=None, ticks=True, tickSize=4, labelPadding=4, labelFlush=True)
     y_axis = alt.Axis(title=None, minExtent=52, maxExtent=52, tickCount=5)
 

@@ -127,7 +127,7 @@ def _template() -> Spec:
     )
     band = alt.Scale(type="band", domain=alt.ExprRef("numbers"), padding=0)
     x = alt.X("n:O", axis=axis, scale=band)
-    scale = alt.Scale(domainMin=alt.ExprRef("low"), domainMax=alt.ExprRef("high"), nice=False, zero=False)
+    scale = alt.Scale(domain=[alt.ExprRef("low"), alt.ExprRef("high")], nice=False, zero=False)
     y_axis = alt.Axis(
         title=None,
         minExtent=36,
