@@ -20,9 +20,12 @@ from app.pages import (
     entry,
     errors,
     gyros,
+    history,
     jobs,
+    measurements,
     method,
     results,
+    session_files,
     sessions,
     sign_in,
     simulations,
@@ -36,8 +39,8 @@ __all__ = ["errors", "mount", "router"]
 
 router = APIRouter(include_in_schema=False)
 for _noun in (
-    today, sessions, entry, results, gyros, types, stands, certificates, simulations, jobs, method, sign_in,
-    choices, assets,
+    today, sessions, session_files, entry, results, measurements, gyros, history, types, stands,
+    certificates, simulations, jobs, method, sign_in, choices, assets,
 ):  # fmt: skip
     router.include_router(_noun.router)
 

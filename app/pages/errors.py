@@ -12,7 +12,7 @@ from starlette.exceptions import HTTPException
 
 from app.errors import AppError, NotFound, Unauthenticated
 from app.i18n import gettext, marked
-from app.pages.base import local_path, render
+from app.pages.base import local_path, person_of, render
 from app.pages.forms import sentence
 
 _log = structlog.get_logger(__name__)
@@ -43,6 +43,8 @@ def page(request: Request, error: AppError | Exception) -> Response:
     if status >= 500:
         _log.log(logging.ERROR, "page-failed", path=request.url.path, exc_info=error)
         request.state.person = None  # the navigation asks the database, which may be what failed
+    elif not hasattr(request.state, "person"):
+        request.state.person = person_of(request)
     title = gettext(_TITLES.get(status, _TITLES[400 if status < 500 else 500]))
     return render(
         request, "errors/page.html", status=status, code=status, title=title, sentences=sentences,

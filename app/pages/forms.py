@@ -31,7 +31,7 @@ class Form:
     Attributes
     ----------
     values
-        By field; fields that were not sent are empty.
+        By field, in the order of the page; fields that were not sent are empty.
     problems
         A problem belongs to the field of its `column`; others belong to the form.
     """
@@ -59,7 +59,8 @@ class Form:
     @property
     def first(self) -> str | None:
         """The first field with a problem: the focus goes there."""
-        return next((item.column for item in self.problems if item.column in self.values), None)
+        wrong = {item.column for item in self.problems}
+        return next((name for name in self.values if name in wrong), None)
 
     @property
     def general(self) -> tuple[str, ...]:
@@ -139,8 +140,3 @@ class Fields:
         except Invalid as error:
             self._problems.extend(error.problems)
             return otherwise
-
-
-def refused(error: AppError) -> int:
-    """Status of a form that comes back: 422 unless it contradicts what is there."""
-    return error.status

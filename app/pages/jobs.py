@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator
 from datetime import UTC, datetime
+from time import monotonic
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends, Request, Response
@@ -10,6 +11,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from app.pages.base import Reader, TheLab, Writer, fragment, render, see
+from app.pages.labels import job_mark
 from app.services import jobs, sessions
 from app.services.lab import Lab, Person
 from app.services.views import JobView, SessionView
@@ -17,6 +19,7 @@ from app.services.views import JobView, SessionView
 router = APIRouter()
 
 _LOOK_EVERY_S: Final = 0.25
+_AGES_EVERY_S: Final = 1.0
 
 Seen = tuple[JobView, SessionView | None]
 
@@ -44,14 +47,21 @@ def detail(request: Request, found: Found) -> Response:
 
 @router.get("/jobs/{job_id}/events", response_class=EventSourceResponse)
 async def events(person: Reader, lab: TheLab, found: Found) -> AsyncIterator[ServerSentEvent]:
-    """The job's state whenever it changes, as a part of the page; ``end`` when nothing more comes."""
+    """The job's state as a part of the page, whenever it changes and every second while it runs.
+
+    ``said`` is its state in words, for a screen reader, when that changes; ``end``: nothing more comes.
+    """
     job, session = found
     shown: JobView | None = None
+    shown_at = 0.0
     while True:
-        if job != shown:
+        if shown is None or job.state != shown.state:
+            yield ServerSentEvent(raw_data=job_mark(job).word, event="said")
+        grown = job.state == "running" and monotonic() - shown_at >= _AGES_EVERY_S
+        if job != shown or grown:
             html = fragment("jobs/state.html", job=job, session=session, now=datetime.now(UTC), person=person)
             yield ServerSentEvent(raw_data=html, event="state")
-            shown = job
+            shown, shown_at = job, monotonic()
         if job.ended:
             break
         await asyncio.sleep(_LOOK_EVERY_S)

@@ -14,7 +14,7 @@ from app.services.simulations import NewSimulation
 
 router = APIRouter()
 
-_FIELDS: Final = ("gyro", "stand", "seed", "duration_s", "rate_hz", "noise_deg_per_h")
+_FIELDS: Final = ("gyro", "stand", "duration_s", "rate_hz", "noise_deg_per_h", "seed")
 _SEEDS: Final = 1_000_000
 
 
