@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.linalg import lapack
 
 from solver.records import Array
 
@@ -125,18 +124,17 @@ def estimate(design: Array, right_side: Array) -> tuple[Array, Array]:
     """
     rows, columns = design.shape
     scale = column_scale(design)
-    both = np.empty((rows, columns + 1), order="F")
+    both = np.empty((rows, columns + 1))
     np.divide(design, scale, out=both[:, :columns])
     both[:, columns] = right_side
-    factored = lapack.dgeqrf(both, overwrite_a=True)[0]
-    if rows < columns or np.abs(factored.diagonal()[:columns]).min() <= rows * _EPS:
+    triangle = np.asarray(np.linalg.qr(both, mode="r"))
+    if rows < columns or np.abs(triangle.diagonal()[:columns]).min() <= rows * _EPS:
         raise np.linalg.LinAlgError(_DEFICIENT)
-    # R⁻¹·[1, Qᵀ·y]
-    identity_and_side = np.eye(columns, columns + 1, order="F")
-    identity_and_side[:, columns] = factored[:columns, columns]
-    solved = lapack.dtrtrs(factored[:columns, :columns], identity_and_side, overwrite_b=True)[0]
-    root = solved[:, :columns] / scale[:, None]
-    return solved[:, columns] / scale, root @ root.T
+    # Not by scipy's LAPACK: its threads and numpy's would wait for each other's processors.
+    root = np.asarray(np.linalg.inv(triangle[:columns, :columns]), np.float64)
+    values = (root @ triangle[:columns, columns]) / scale
+    root /= scale[:, None]
+    return values, root @ root.T
 
 
 def _pad(design: Array) -> Array:
