@@ -13,17 +13,16 @@
 
   // Rows are saved one after the other, so that the line of state is the last one's.
   const queue = [];
-  let busy = false;
+  let busy = null;
   const next = () => {
-    const name = queue.shift();
-    busy = name !== undefined;
+    busy = queue.shift() || null;
     if (!busy) return;
-    const form = document.getElementById(`${name}-f`);
+    const form = document.getElementById(`${busy}-f`);
     if (form) form.requestSubmit(); else next();
   };
   const save = (row, pasted) => {
     const form = document.getElementById(`${row.id}-f`);
-    if (!form || !unsaved(row) || !filled(row)) return;
+    if (!form || busy === row.id || !unsaved(row) || !filled(row)) return;
     if (pasted && !form.elements.origin) {
       const origin = document.createElement("input");
       Object.assign(origin, { type: "hidden", name: "origin", value: "pasted" });
