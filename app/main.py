@@ -66,9 +66,9 @@ def create_app(settings: Settings, opening: Opening = working_lab) -> FastAPI:
     app.mount(api.ROOT, service)
     pages.mount(app)
     for kind in (AppError, RequestValidationError, HTTPException):
-        app.add_exception_handler(kind, _page)
-    service.add_middleware(LastResort, answer=api.unforeseen)
-    app.add_middleware(LastResort, answer=_page)
+        app.add_exception_handler(kind, _answer)
+    service.add_middleware(LastResort, answer=api.problems.answer)
+    app.add_middleware(LastResort, answer=_answer)
     _protect(app, settings)
     return app
 
@@ -85,10 +85,17 @@ def _foreign(scope: Scope) -> Response:
     error = Forbidden(
         problem("cross-site", "This request came from another site. Open the page here and send it again.")
     )
-    if scope["path"].startswith(api.ROOT + "/"):
-        return api.problem_response(error)
+    if _is_for_programs(scope["path"]):
+        return api.problems.response(error)
     return Response(str(error), error.status, media_type="text/plain")
 
 
-async def _page(request: Request, error: Exception) -> Response:
+async def _answer(request: Request, error: Exception) -> Response:
+    """A problem document for programs, a page for people."""
+    if _is_for_programs(request.url.path):
+        return await api.problems.answer(request, error)
     return await asyncio.to_thread(pages.errors.page, request, error)
+
+
+def _is_for_programs(path: str) -> bool:
+    return path.startswith("/api/")

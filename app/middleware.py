@@ -42,7 +42,7 @@ _HEADERS: Final = {
     "permissions-policy": "camera=(), geolocation=(), microphone=()",
 }
 _HSTS: Final = "max-age=31536000"
-_IN_MEMORY_BYTES: Final = 8 * 2**20
+IN_MEMORY_BYTES: Final = 8 * 2**20
 
 _log = structlog.get_logger("driftbook.request")
 
@@ -162,9 +162,10 @@ class BodyLimit:
     files the form parser keeps on disk, have the large one.
     """
 
-    def __init__(self, app: ASGIApp, *, largest: int) -> None:
+    def __init__(self, app: ASGIApp, *, largest: int, in_memory: int = IN_MEMORY_BYTES) -> None:
         self._app = app
         self._largest = largest
+        self._in_memory = in_memory
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass on, counting."""
@@ -175,7 +176,7 @@ class BodyLimit:
         announced = int(declared) if declared.isdecimal() else 0
         form = headers.get("content-type", "").startswith("multipart/form-data")
         spooled = form and not scope["path"].startswith("/api/")
-        budget = Budget(self._largest if spooled else min(self._largest, _IN_MEMORY_BYTES))
+        budget = Budget(self._largest if spooled else min(self._largest, self._in_memory))
         scope.setdefault("state", {})["body_budget"] = budget
 
         async def counted() -> Message:

@@ -30,10 +30,8 @@ from app.api import (
 from app.api.health import router as health
 from app.api.links import ROOT
 from app.api.metrics import Metrics
-from app.api.problems import response as problem_response
-from app.api.problems import unforeseen
 
-__all__ = ["ROOT", "Metrics", "create", "health", "problem_response", "unforeseen"]
+__all__ = ["ROOT", "Metrics", "create", "health", "problems"]
 
 _DESCRIPTION: Final = (
     "Calibration of dynamically tuned gyroscopes: gyros, stands and their certificates, sessions, "

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import jinja2
 from fastapi import APIRouter, Request
-from fastapi.responses import HTMLResponse
+from fastapi.responses import HTMLResponse, RedirectResponse
 
 from app.api import links
 
@@ -31,6 +31,12 @@ KINDS: Final = {
 
 _TEMPLATES: Final = Path(__file__).parents[2] / "templates"
 Json = Mapping[str, Any]
+
+
+@router.get("/")
+def root() -> RedirectResponse:
+    """Whoever comes to the root wants to know what there is."""
+    return RedirectResponse(f"{links.ROOT}/docs")
 
 
 @router.get("/docs", response_class=HTMLResponse)

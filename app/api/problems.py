@@ -60,9 +60,21 @@ def job_failed(problems: Iterable[ProblemView]) -> Json:
 
 def install(app: FastAPI) -> None:
     """Answer every refusal of `app` by a problem document."""
-    app.add_exception_handler(AppError, _foreseen)
-    app.add_exception_handler(RequestValidationError, _unfit)
-    app.add_exception_handler(HTTPException, _refused)
+    for kind in (AppError, RequestValidationError, HTTPException):
+        app.add_exception_handler(kind, answer)
+
+
+async def answer(request: Request, error: Exception) -> JSONResponse:
+    """The problem document for any error; of one that nobody foresaw, nothing is told but logged."""
+    if isinstance(error, AppError):
+        media_type = request.headers.get("content-type", "")
+        return response(error, json_body=_JSON_MEDIA.match(media_type) is not None)
+    if isinstance(error, RequestValidationError):
+        return _unfit(error)
+    if isinstance(error, HTTPException):
+        return _refused(error)
+    _log.error("unforeseen", exc_info=error)
+    return _answer(document(500, "Internal error", "internal", [_said(_CODES[500])]))
 
 
 def response(error: AppError, *, json_body: bool = False) -> JSONResponse:
@@ -72,14 +84,7 @@ def response(error: AppError, *, json_body: bool = False) -> JSONResponse:
     return _answer(document(error.status, error.title, _slug(type(error).__name__), errors), challenge)
 
 
-async def _foreseen(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, AppError)
-    media_type = request.headers.get("content-type", "")
-    return response(error, json_body=_JSON_MEDIA.match(media_type) is not None)
-
-
-async def _unfit(_request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, RequestValidationError)
+def _unfit(error: RequestValidationError) -> JSONResponse:
     found = error.errors()
     if found[0]["loc"] == ("body",) and isinstance(error.body, bytes):
         return _answer(document(415, "Unsupported media type", "unsupported-media-type", [_said(_NO_JSON)]))
@@ -89,18 +94,11 @@ async def _unfit(_request: Request, error: Exception) -> JSONResponse:
     return _answer(document(422, "Input not usable", "invalid", errors))
 
 
-async def _refused(_request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, HTTPException)
+def _refused(error: HTTPException) -> JSONResponse:
     title = HTTPStatus(error.status_code).phrase
     message = _CODES.get(error.status_code, Message(_slug(title), error.detail))
     content = document(error.status_code, title, _slug(title), [_said(message)])
     return _answer(content, error.headers)
-
-
-async def unforeseen(_request: Request, error: Exception) -> JSONResponse:
-    """The answer to an error of ours: it is logged, and nothing of it is told."""
-    _log.error("unforeseen", exc_info=error)
-    return _answer(document(500, "Internal error", "internal", [_said(_CODES[500])]))
 
 
 def _answer(content: Json, headers: Mapping[str, str] | None = None) -> JSONResponse:

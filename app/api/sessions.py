@@ -1,5 +1,6 @@
 """Sessions."""
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Header, Query, Request, Response
@@ -9,6 +10,7 @@ from app.api.auth import Reader, Uploader
 from app.api.pagination import CSV_TOO, Columns, Listing, Part, listed
 from app.api.schemas.common import Id, Name, Since, Until
 from app.api.schemas.measuring import NewSession, Session, SessionDetail
+from app.exchange.si import PARAMETER_UNITS
 from app.services import idempotency, sessions
 
 router = APIRouter(tags=["sessions"])
@@ -89,5 +91,13 @@ def detail(session_id: Id, caller: Reader) -> SessionDetail:
         found = sessions.detail(work, session_id)
     head = Session.model_validate(found.session)
     return SessionDetail.model_validate(
-        dict(head) | {"positions": found.positions, "results": found.results, "truth": found.truth}
+        dict(head) | {"positions": found.positions, "results": found.results, "truth": _truth(found.truth)}
     )
+
+
+def _truth(values: Mapping[str, float] | None) -> dict[str, Any] | None:
+    """A simulated gyro's true parameters in the shape of `truth.json`."""
+    if values is None:
+        return None
+    units = {name: PARAMETER_UNITS[name][0] for name in values}
+    return {"parameters": {name: {"value": value, "unit": units[name]} for name, value in values.items()}}

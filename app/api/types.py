@@ -24,7 +24,8 @@ def set_limits(name: Name, body: NewLimits, caller: Uploader) -> GyroType:
     """Enter a type's limits, in laboratory units; an unknown type is created."""
     with caller.write() as work:
         gyros.set_limits(work, name, {key: (limit.low, limit.high) for key, limit in body.limits.items()})
-        return next(_shown(item) for item in gyros.types(work) if item.name == name.strip())
+        known = {item.name: item for item in gyros.types(work)}
+    return _shown(known[name.strip()])
 
 
 def _shown(view: TypeView) -> GyroType:

@@ -72,9 +72,8 @@ def set_limits(work: Work, type_name: str, limits: Mapping[str, tuple[float, flo
             raise Invalid(
                 problem("bad-limit", "The lower limit must be below the upper one.", column=parameter)
             )
-    kind = equipment.gyro_type(work.db, type_name) or GyroType(
-        name=checked_name(type_name, "type"), note=note
-    )
+    name = checked_name(type_name, "type")
+    kind = equipment.gyro_type(work.db, name) or GyroType(name=name, note=note)
     work.db.add(kind)
     kind.limits.clear()
     work.db.flush()

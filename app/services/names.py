@@ -8,7 +8,7 @@ def checked_name(value: str, column: str) -> str:
     value = value.strip()
     if not value:
         raise Invalid(problem("empty", "This must not be empty.", column=column))
-    if any(character in value for character in "/?#\\\n\t\x00") or value in (".", ".."):
+    if any(character in value for character in "/?#\\") or not value.isprintable() or value in (".", ".."):
         raise Invalid(problem("bad-name", "“%(value)s” has a character that a name cannot have (/ ? # \\).",
                               column=column, value=value))  # fmt: skip
     return value
