@@ -8,7 +8,7 @@ from typing import Annotated, TypeVar
 from fastapi import Depends, Request
 from starlette.datastructures import FormData, UploadFile
 
-from app.errors import AppError, Invalid, Problem, problem
+from app.errors import Invalid, Problem, problem
 from app.exchange.numbers import typed
 from app.i18n import gettext, translate
 

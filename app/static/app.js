@@ -26,6 +26,10 @@
     const { view } = await window.vegaEmbed(place, { ...chart.spec, width }, options);
     chart.view?.finalize();
     chart.view = view;
+    // Vega gives marks of no point the role of a picture: without a name it would be one nobody can read.
+    for (const mark of place.querySelectorAll("[role=graphics-symbol]:not([aria-label])")) {
+      if (!mark.childElementCount) mark.setAttribute("aria-hidden", "true");
+    }
     element.replaceChildren(place);
     element.dataset.ready = "";
   };

@@ -48,6 +48,18 @@ def queue() -> Notebook:
     return Notebook()
 
 
+@pytest.fixture
+def queued(queue: Notebook) -> list[str]:
+    """Jobs that were put in the queue."""
+    return queue.queued
+
+
+@pytest.fixture
+def cancelled(queue: Notebook) -> list[str]:
+    """Jobs that were taken out of it."""
+    return queue.cancelled
+
+
 @pytest.fixture(scope="session")
 def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A database with its tables and two accounts, to be copied: hashing a password is slow on purpose."""

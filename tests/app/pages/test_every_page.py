@@ -1,0 +1,121 @@
+"""What holds for every page, whoever asks for it."""
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from app.pages.base import TEMPLATES
+from app.services.lab import Lab
+
+READABLE = [
+    "/", "/gyros", "/types/GVK-6", "/stands", "/stands/S1", "/certificates", "/certificates/S1/C-17", "/method",
+]  # fmt: skip
+WRITABLE = ["/gyros/new", "/gyros/0417/edit", "/stands/new", "/certificates/new", "/simulations/new"]
+POSTED = [
+    "/gyros/new",
+    "/gyros/0417/edit",
+    "/types/GVK-6",
+    "/stands/new",
+    "/certificates/new",
+    "/simulations/new",
+]
+
+
+class Outline(HTMLParser):
+    """Notes what a page must not have, and what everything in it needs."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.forbidden: list[str] = []
+        self.unnamed: list[str] = []
+        self.ids: list[str] = []
+        self.labelled: set[str] = set()
+        self.inputs: list[dict[str, str | None]] = []
+        self.primaries = 0
+        self._in_script = False
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        given = dict(attributes)
+        self.tags.append(tag)
+        self._in_script = tag == "script"
+        for name in given:
+            if name == "style" or name.startswith("on"):
+                self.forbidden.append(f"<{tag} {name}>")
+        if tag == "style" or (tag == "script" and not given.get("src")):
+            self.forbidden.append(f"<{tag}>")
+        for name in ("src", "href"):
+            if (given.get(name) or "").startswith(("http:", "https:", "//")):
+                self.forbidden.append(f"{name}={given[name]}")
+        if "id" in given:
+            self.ids.append(given["id"] or "")
+        if tag == "label":
+            self.labelled.add(given.get("for") or "")
+        if tag in ("input", "select", "textarea") and given.get("type") not in ("hidden", "checkbox"):
+            self.inputs.append(given)
+        self.primaries += "primary" in (given.get("class") or "").split()
+
+    def nameless(self) -> list[str]:
+        return [
+            str(field.get("name"))
+            for field in self.inputs
+            if not field.get("aria-label") and field.get("id") not in self.labelled
+        ]
+
+
+def test_nobody_reads_without_signing_in(anonymous: TestClient, stocked: Lab) -> None:
+    for path in (*READABLE, *WRITABLE):
+        answer = anonymous.get(path)
+        assert answer.status_code == 303, path
+        assert answer.headers["location"].startswith("/sign-in")
+
+
+def test_whoever_may_only_read_reads(designer: TestClient, stocked: Lab) -> None:
+    assert [designer.get(path).status_code for path in READABLE] == [200] * len(READABLE)
+
+
+def test_whoever_may_only_read_gets_no_form(designer: TestClient, stocked: Lab) -> None:
+    for path in WRITABLE:
+        answer = designer.get(path)
+        assert answer.status_code == 403, path
+        assert "This needs the scope “upload”" in answer.text
+        assert 'href="/gyros"' in answer.text  # the navigation is still there
+
+
+def test_whoever_may_only_read_changes_nothing(designer: TestClient, stocked: Lab) -> None:
+    sent = {"serial": "1", "type": "T", "name": "S2", "latitude_deg": "1"}
+    assert [designer.post(path, data=sent).status_code for path in POSTED] == [403] * len(POSTED)
+
+
+@pytest.mark.parametrize("language", ["en", "ru"])
+def test_pages_are_clean_and_named(technician: TestClient, stocked: Lab, language: str) -> None:
+    for path in (*READABLE, *WRITABLE):
+        answer = technician.get(path, headers={"accept-language": language})
+        assert answer.status_code == 200, path
+        outline = Outline()
+        outline.feed(answer.text)
+        assert f'<html lang="{language}"' in answer.text
+        assert outline.forbidden == [], path
+        assert len(outline.ids) == len(set(outline.ids)), path
+        assert outline.nameless() == [], path
+        assert outline.primaries <= 1, path
+        assert outline.tags.count("h1") == 1, path
+        assert outline.tags.count("main") == 1, path
+
+
+def test_russian_pages_speak_russian(technician: TestClient, stocked: Lab) -> None:
+    for path in READABLE:
+        text = technician.get(path, headers={"accept-language": "ru"}).text
+        main = re.sub(r"<[^>]+>", " ", text[text.index("<main") :])
+        russian, latin = len(re.findall(r"[а-яё]", main)), len(re.findall(r"\b[a-z]{4,}\b", main))
+        assert russian > 5 * latin, path
+
+
+@pytest.mark.parametrize("template", sorted(TEMPLATES.rglob("*.html")), ids=lambda path: str(path.name))
+def test_no_template_has_style_or_script_inside(template: Path) -> None:
+    text = template.read_text(encoding="utf-8")
+    assert not re.search(r"\sstyle=|<style|\son[a-z]+=\"|hx-on|javascript:", text)
+    assert not re.search(r"<script(?![^>]*\ssrc=)", text)
