@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AbstractContextManager, asynccontextmanager, contextmanager
+from datetime import timedelta
 from typing import Final
 
 from fastapi import FastAPI
@@ -16,12 +17,16 @@ from app import api, logs, pages
 from app.errors import AppError, Forbidden, problem
 from app.jobs.engine import JobEngine
 from app.middleware import BodyLimit, LastResort, RequestLog, SameSite, SecurityHeaders
+from app.services import uploads
 from app.services.lab import Lab
 from app.services.ledger import JobLedger
 from app.services.opening import open_lab
 from app.settings import Settings
 
 _PRELOAD: Final = ("app.services.computing",)
+_LEFT_BEHIND: Final = timedelta(days=1)
+"""No upload takes so long: older parts of one belong to nobody."""
+
 Opening = Callable[[Settings], AbstractContextManager[Lab]]
 
 
@@ -32,6 +37,7 @@ def working_lab(settings: Settings) -> Iterator[Lab]:
         engine = JobEngine(settings.url, JobLedger(lab), slots=settings.workers, preload=_PRELOAD)
         lab.queue = engine
         engine.start()
+        uploads.sweep(settings.uploads, _LEFT_BEHIND)
         try:
             yield lab
         finally:

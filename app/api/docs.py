@@ -61,30 +61,28 @@ def _template() -> jinja2.Template:
 def _operations(document: Json) -> Iterator[Json]:
     for path, methods in document["paths"].items():
         for method, operation in methods.items():
+            responses = operation["responses"]
             yield {
                 "tag": operation["tags"][0],
                 "anchor": operation["operationId"],
                 "method": method.upper(),
-                "path": links.ROOT + path,
+                "short": path,
                 "text": operation.get("description", ""),
                 "parameters": [_parameter(item) for item in operation.get("parameters", [])],
                 "bodies": list(_bodies(operation.get("requestBody", {}), document)),
-                "responses": [
-                    {"status": status, "text": answer["description"], "of": _answered(answer)}
-                    for status, answer in operation["responses"].items()
+                "answers": [
+                    (status, answer["description"], _answered(answer))
+                    for status, answer in responses.items()
+                    if status < "400"
                 ],
+                "problems": sorted(status for status in responses if status >= "400"),
             }
 
 
-def _parameter(item: Json) -> Json:
-    schema = item["schema"]
-    return {
-        "name": item["name"],
-        "where": item["in"],
-        "required": item.get("required", False),
-        "kind": _kind(schema),
-        "text": item.get("description") or schema.get("description", ""),
-    }
+def _parameter(item: Json) -> tuple[str, ...]:
+    schema, required = item["schema"], item.get("required", False)
+    text = item.get("description") or schema.get("description", "")
+    return item["name"], item["in"], _kind(schema), _yes(required), text
 
 
 def _bodies(body: Json, document: Json) -> Iterator[Json]:
@@ -94,16 +92,15 @@ def _bodies(body: Json, document: Json) -> Iterator[Json]:
             schema = document["components"]["schemas"][_name(schema)]
         required = schema.get("required", [])
         fields = [
-            {
-                "name": name,
-                "kind": _kind(field),
-                "required": name in required,
-                "text": field.get("description", ""),
-            }
+            (name, _kind(field), _yes(name in required), field.get("description", ""))
             for name, field in schema.get("properties", {}).items()
         ]
         examples = [json.dumps(item, ensure_ascii=False, indent=2) for item in schema.get("examples", [])]
         yield {"media_type": media_type, "fields": fields, "examples": examples}
+
+
+def _yes(is_so: bool) -> str:
+    return "yes" if is_so else "no"
 
 
 def _answered(answer: Json) -> str:
@@ -116,7 +113,7 @@ def _answered(answer: Json) -> str:
 def _kind(schema: Json) -> str:
     """A schema in a few words: ``number or null``, ``list of Position``, ``one of both, paper``."""
     if "$ref" in schema:
-        return _name(schema)
+        return _shown_name(schema)
     if "anyOf" in schema:
         return " or ".join(_kind(item) for item in schema["anyOf"])
     if "enum" in schema:
@@ -129,3 +126,9 @@ def _kind(schema: Json) -> str:
 
 def _name(schema: Json) -> str:
     return str(schema["$ref"]).rsplit("/", 1)[-1]
+
+
+def _shown_name(schema: Json) -> str:
+    """`Listing_Gyro_` is what a generic model is called."""
+    name, of, item = _name(schema).partition("Listing_")
+    return f"list of {item.rstrip('_')}" if of else name

@@ -22,6 +22,7 @@ _ALWAYS: Final = {
     "403": "The token's scopes do not reach.",
     "422": "Something in the request cannot be used; each place is named.",
 }
+_DONE: Final = {"200": "Here it is.", "201": "It was made.", "202": "It was put in the queue."}
 _WORDS: Final = {
     "404": "There is no such thing.",
     "409": "It contradicts what is there.",
@@ -51,8 +52,15 @@ def _described(app: FastAPI) -> dict[str, Any]:
     for path in document["paths"].values():
         for method, operation in path.items():
             if method in _METHODS:
+                _successes(operation)
                 _refusals(operation)
     return document
+
+
+def _successes(operation: dict[str, Any]) -> None:
+    for status, answer in operation["responses"].items():
+        if answer["description"] == "Successful Response":
+            answer["description"] = _DONE[status]
 
 
 def _refusals(operation: dict[str, Any]) -> None:

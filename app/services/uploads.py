@@ -3,10 +3,11 @@
 Everything here happens before the transaction that refers to it: whatever a row names is on disk.
 """
 
+import shutil
 import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Final
 
@@ -138,6 +139,14 @@ def bring_in(work: Work, arrived: Arrived, wanted: Wanted) -> BroughtIn:
     job = calibrations.request(work, opened.id, wanted.method) if wanted.method else None
     warnings = arrived.warnings + _differences(work, opened, arrived)
     return BroughtIn(sessions.session(work, opened.id), saved, job, warnings)
+
+
+def sweep(folder: Path, older_than: timedelta) -> None:
+    """Remove what uploads left behind when the service was killed."""
+    oldest = datetime.now(UTC) - older_than
+    for path in folder.iterdir():
+        if datetime.fromtimestamp(path.stat().st_mtime, UTC) < oldest:
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
 def brought_before(work: Work, session_id: int) -> BroughtIn:

@@ -35,7 +35,8 @@ def test_every_call_stands_on_the_page(page: httpx.Response) -> None:
     assert page.status_code == 200
     for path, methods in api.create().openapi()["paths"].items():
         for method in methods:
-            assert f"{method.upper()} {API}{path}" in page.text
+            assert f"{method.upper()} {path}" in page.text
+    assert f"under <code>{API}</code>" in page.text
 
 
 def test_nothing_comes_from_elsewhere(shared_service: Service, page: httpx.Response) -> None:
@@ -48,7 +49,7 @@ def test_nothing_comes_from_elsewhere(shared_service: Service, page: httpx.Respo
             assert target[1:] in links.anchors
         else:
             assert target.startswith("/")
-            assert root.get(target).status_code == 200, target
+            assert root.get(target, follow_redirects=True).status_code == 200, target
 
 
 def test_every_kind_of_problem_is_explained(page: httpx.Response, shared_service: Service) -> None:

@@ -1,13 +1,17 @@
 import gzip
 import hashlib
 import io
+import socket
 import threading
+import time
+from collections.abc import Callable
 from typing import Any
 
 import httpx
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+import structlog
 from serving import Service
 
 MEANS = {"jx_ma": 0.004536, "jy_ma": -0.002117, "duration_s": 60, "rate_hz": 200}
@@ -150,3 +154,27 @@ def test_a_record_longer_than_the_limit(service: Service, session_id: int) -> No
     assert refused.status_code == 413
     assert refused.json()["code"] == "too-big"
     assert list(service.lab.settings.uploads.iterdir()) == []
+
+
+def test_a_client_that_goes_away_leaves_nothing(service: Service, session_id: int) -> None:
+    address, path = service.url.removeprefix("http://").split(":"), place(session_id, "currents")
+    with (
+        structlog.testing.capture_logs() as lines,
+        socket.create_connection((address[0], int(address[1])), timeout=10) as connection,
+    ):
+        head = (
+            f"PUT /api/v1{path} HTTP/1.1\r\nhost: lab\r\nauthorization: Bearer {service.tokens['both']}\r\n"
+        )
+        connection.sendall(f"{head}content-length: 1000\r\n\r\nt_s,jx_ma,jy_ma\n".encode())
+        wait_until(lambda: list(service.lab.settings.uploads.iterdir()))
+        connection.close()
+        wait_until(lambda: [line for line in lines if line["event"] == "request"])
+    assert list(service.lab.settings.uploads.iterdir()) == []
+    assert [line for line in lines if line["log_level"] == "error"] == []
+
+
+def wait_until(happened: Callable[[], Any]) -> None:
+    deadline = time.monotonic() + 10
+    while not happened():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
