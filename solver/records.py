@@ -108,13 +108,17 @@ class Observations:
         return cls(repeat=repeat[order], latitude=float(latitude), **clean)  # type: ignore[arg-type]
 
     def input_hash(self) -> str:
-        """SHA-256 over the values in their sorted order: equal input, equal hash.
+        """SHA-256 over what the parameters are computed from: equal input, equal hash.
 
-        The bytes are each field's name and its values as little-endian binary64; −0.0 counts as 0.0.
+        The bytes are each field's name and its values, in their sorted order, as little-endian
+        binary64; −0.0 counts as 0.0. Duration and rate are left out: no parameter depends on them,
+        and means that are typed without them are the same means.
         """
         digest = hashlib.sha256(b"driftbook-input-1")
         for item in fields(self):
             value = getattr(self, item.name)
+            if item.name in ("duration", "rate"):
+                continue
             digest.update(item.name.encode() + b"\0")
             if value is not None:
                 digest.update((np.asarray(value, dtype="<f8") + 0.0).tobytes())
