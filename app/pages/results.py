@@ -101,6 +101,7 @@ def parameters(person: Reader, lab: TheLab, result_id: int) -> Response:
 
 
 def _parameter_rows(view: CalibrationView, answer: Mapping[str, Any]) -> Iterator[Row]:
+    judging = "paper" if view.method == "paper" else "least-squares"
     for name, found in answer.get("parameters", {}).items():
         judged = view.summary.parameters[name]
         u = found["standard_uncertainty"]
@@ -108,7 +109,7 @@ def _parameter_rows(view: CalibrationView, answer: Mapping[str, Any]) -> Iterato
             "method": answer["method"], "parameter": name, "value": found["value"], "unit": found["unit"],
             "standard_uncertainty": u, "expanded_uncertainty": None if u is None else COVERAGE_FACTOR * u,
             "coverage_factor": COVERAGE_FACTOR, "low": judged.low, "high": judged.high,
-            "verdict": judged.verdict if answer["method"] == view.summary.method else None,
+            "verdict": judged.verdict if answer["method"] == judging else None,
         }  # fmt: skip
 
 
@@ -125,7 +126,7 @@ def _residuals(page: ResultPage) -> plots.theme.Spec:
 
 def _convergence(page: ResultPage) -> plots.theme.Spec | None:
     changes = list(page.changes())
-    if not changes:
+    if not any(change.relative for change in changes):
         return None
     return plots.convergence(
         changes,

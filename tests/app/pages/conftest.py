@@ -1,6 +1,7 @@
+import math
 import shutil
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import date, timedelta
 from pathlib import Path
 
@@ -12,9 +13,10 @@ from starlette.exceptions import HTTPException, StarletteDeprecationWarning
 
 from app import pages
 from app.errors import AppError
-from app.exchange.rows import CertificateRow
-from app.services import access, gyros, stands
+from app.exchange.rows import CertificateRow, MeansRow
+from app.services import access, calibrations, computing, gyros, ingest, sessions, stands
 from app.services.lab import Lab
+from app.services.sessions import NewSession, open_session
 from app.settings import Settings
 from app.store.database import Database
 from app.store.migrate import upgrade
@@ -127,3 +129,57 @@ def stocked(lab: Lab) -> Lab:
         rows = [CertificateRow(theta, psi, 6.9, -16.4, 6.6) for theta, psi in GRID]
         stands.add_certificate(work, "S1", "C-17", date(2020, 1, 1), date(2100, 1, 1), rows, "Metrology")
     return lab
+
+
+def currents_ma(theta_deg: float, psi_deg: float) -> tuple[float, float]:
+    """Torquer currents of a gyro without misalignment at 55.7558° (spec 1.2 to 1.4), with a little noise.
+
+    K = 2063 °/h/mA on both axes, no cross-coupling, ω0 = (1.5, −0.75) °/h, ωg = 0.9, ωк = −0.2 °/h/g.
+    """
+    theta, psi, latitude = (math.radians(angle) for angle in (theta_deg, psi_deg, 55.7558))
+    north, up = 15.041067 * math.cos(latitude), 15.041067 * math.sin(latitude)
+    a, b = math.sin(psi) * math.cos(theta), math.cos(psi) * math.cos(theta)
+    c, d = math.sin(psi) * math.sin(theta), math.cos(psi) * math.sin(theta)
+    noise = 2e-3 * math.sin(7.0 * theta_deg + 3.0 * psi_deg + 1.0)
+    jx = (north * a + up * c - 1.5 - 0.9 * c - 0.2 * d + noise) / 2063.0
+    jy = (north * b + up * d + 0.75 + 0.2 * c - 0.9 * d - noise) / 2063.0
+    return jx, jy
+
+
+@pytest.fixture
+def opened(stocked: Lab) -> int:
+    """A session of gyro 0417 on stand S1 in which nothing is measured."""
+    with stocked.write(access.SYSTEM) as work:
+        return open_session(work, NewSession("0417", "S1", temperature_c=21.5)).id
+
+
+@pytest.fixture
+def measured(stocked: Lab, opened: int) -> int:
+    """A session in which every position is typed."""
+    with stocked.write(access.SYSTEM) as work:
+        for theta, psi in GRID:
+            row = MeansRow(theta, psi, *currents_ma(theta, psi), 1e-6, 1e-6, 60.0, 200.0)
+            ingest.save_means(work, opened, row, ingest.Source("typed"))
+    return opened
+
+
+def solve(lab: Lab, session_id: int, method: str = "both") -> int:
+    """Solve a session here and now, as the job would, and keep its result."""
+    with lab.write(access.SYSTEM) as work:
+        inputs = [item.measurement.id for item in sessions.detail(work, session_id).positions
+                  if item.measurement and not item.measurement.withdrawn]  # fmt: skip
+        wanted = {"method": method, "inputs": inputs}
+        output = computing.calibrate(calibrations.prepare(work, session_id, wanted), lambda part, phase: None)
+        return calibrations.store(work, session_id, wanted, output)
+
+
+@pytest.fixture
+def result(stocked: Lab, measured: int) -> int:
+    """The result of a session by both methods."""
+    return solve(stocked, measured)
+
+
+@pytest.fixture
+def solving() -> Callable[..., int]:
+    """Solves a session here and now."""
+    return solve

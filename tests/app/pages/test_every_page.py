@@ -8,12 +8,21 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.pages.base import TEMPLATES
+from app.services import access, calibrations
 from app.services.lab import Lab
 
 READABLE = [
     "/", "/gyros", "/types/GVK-6", "/stands", "/stands/S1", "/certificates", "/certificates/S1/C-17", "/method",
+    "/sessions", "/results", "/gyros/0417",
 ]  # fmt: skip
-WRITABLE = ["/gyros/new", "/gyros/0417/edit", "/stands/new", "/certificates/new", "/simulations/new"]
+WRITABLE = [
+    "/sessions/new",
+    "/gyros/new",
+    "/gyros/0417/edit",
+    "/stands/new",
+    "/certificates/new",
+    "/simulations/new",
+]
 POSTED = [
     "/gyros/new",
     "/gyros/0417/edit",
@@ -62,7 +71,9 @@ class Outline(HTMLParser):
         return [
             str(field.get("name"))
             for field in self.inputs
-            if not field.get("aria-label") and field.get("id") not in self.labelled
+            if not field.get("aria-label")
+            and not field.get("aria-labelledby")
+            and field.get("id") not in self.labelled
         ]
 
 
@@ -104,6 +115,27 @@ def test_pages_are_clean_and_named(technician: TestClient, stocked: Lab, languag
         assert outline.primaries <= 1, path
         assert outline.tags.count("h1") == 1, path
         assert outline.tags.count("main") == 1, path
+
+
+def test_pages_of_a_measured_session_are_clean_and_named(
+    technician: TestClient, stocked: Lab, measured: int, result: int
+) -> None:
+    with stocked.read(access.SYSTEM) as work:
+        first = calibrations.calibration(work, result).inputs[0].id
+    paths = [
+        "/sessions", f"/sessions/{measured}", f"/sessions/{measured}/entry",
+        f"/sessions/{measured}/entry?unit=ma&columns=all", "/results", f"/results/{result}", "/gyros/0417",
+        f"/measurements/{first}",
+    ]  # fmt: skip
+    for path in paths:
+        outline = Outline()
+        text = technician.get(path).text
+        outline.feed(text)
+        assert outline.forbidden == [], path
+        assert len(outline.ids) == len(set(outline.ids)), path
+        assert outline.nameless() == [], path
+        assert outline.primaries <= 1, path
+        assert outline.tags.count("h1") == 1, path
 
 
 def test_russian_pages_speak_russian(technician: TestClient, stocked: Lab) -> None:

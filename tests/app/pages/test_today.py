@@ -42,7 +42,7 @@ def test_the_open_session_names_the_next_position(technician: TestClient, stocke
     page = technician.get("/").text
     assert "<h1>Position 11 of 16</h1>" in page
     assert "10 recorded, 6 to do" in page
-    assert f'href="/sessions/{number}#position-11">Enter position 11' in page
+    assert f'href="/sessions/{number}/entry#position-11">Enter position 11' in page
     assert page.count('class="cell ok"') == 10
     assert page.count('class="cell todo"') == 5
     assert page.count('class="cell running"') == 1
