@@ -10,11 +10,13 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))  # for `serving`: test modules are no package
 
-from serving import NotingQueue, Service, opened, ready, running
+from serving import NotingQueue, Server, Service, opened, ready, running, served, visited
 
 from app.main import Opening
 from app.services.opening import open_lab
 from app.settings import Settings
+
+UPLOAD_LIMIT_BYTES = 16 * 2**20
 
 
 @pytest.fixture(scope="session")
@@ -29,7 +31,9 @@ def empty_data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def settings(tmp_path: Path, empty_data: Path) -> Settings:
     """A laboratory with nothing in it."""
-    return Settings(data=Path(shutil.copytree(empty_data, tmp_path / "data")), upload_limit_bytes=16 * 2**20)
+    return Settings(
+        data=Path(shutil.copytree(empty_data, tmp_path / "data")), upload_limit_bytes=UPLOAD_LIMIT_BYTES
+    )
 
 
 @pytest.fixture
@@ -44,11 +48,26 @@ def noting(noted: NotingQueue) -> Opening:
     return lambda settings: open_lab(settings, noted)
 
 
-@pytest.fixture
-def service(settings: Settings, noting: Opening) -> Iterator[Service]:
-    """The service without a job engine."""
-    with running(settings, noting) as found:
+@pytest.fixture(scope="session")
+def server(tmp_path_factory: pytest.TempPathFactory, empty_data: Path) -> Iterator[Server]:
+    """The server that every test's laboratory is shown by in turn."""
+    data = Path(shutil.copytree(empty_data, tmp_path_factory.mktemp("served") / "data"))
+    settings = Settings(data=data, upload_limit_bytes=UPLOAD_LIMIT_BYTES)
+    with served(settings, lambda settings: open_lab(settings, NotingQueue())) as found:
         yield found
+
+
+@pytest.fixture
+def service(server: Server, settings: Settings, noting: Opening) -> Iterator[Service]:
+    """The service of a laboratory of the test's own, without a job engine."""
+    before = server.app.state.lab
+    with noting(settings) as lab:
+        server.show(lab)
+        try:
+            with visited(server.url, lab) as found:
+                yield found
+        finally:
+            server.show(before)
 
 
 @pytest.fixture(scope="session")

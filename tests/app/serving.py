@@ -8,7 +8,9 @@ from typing import Any
 
 import httpx
 import uvicorn
+from fastapi import FastAPI
 from sqlalchemy.orm import Session
+from starlette.routing import Mount
 
 from app.main import Opening, create_app
 from app.services import access
@@ -73,8 +75,22 @@ def opened(client: httpx.Client, **said: Any) -> int:
     return int(made.json()["id"])
 
 
+@dataclass
+class Server:
+    """A server at its address."""
+
+    url: str
+    app: FastAPI
+
+    def show(self, lab: Lab) -> None:
+        """Serve this laboratory from now on: an application takes longer to build than a laboratory."""
+        self.app.state.lab = lab
+        programs = next(route for route in self.app.routes if isinstance(route, Mount) and route.path == API)
+        programs.app.state.lab = lab  # type: ignore[attr-defined]
+
+
 @contextmanager
-def running(settings: Settings, opening: Opening) -> Iterator[Service]:
+def served(settings: Settings, opening: Opening) -> Iterator[Server]:
     """Serve in a thread, on a free port, until the block ends."""
     app = create_app(settings, opening)
     config = uvicorn.Config(
@@ -88,19 +104,28 @@ def running(settings: Settings, opening: Opening) -> Iterator[Service]:
             assert thread.is_alive(), "the service did not start"
             thread.join(0.01)
         port = server.servers[0].sockets[0].getsockname()[1]
-        service = Service(f"http://127.0.0.1:{port}", app.state.lab, {})
-        with service.lab.write(access.SYSTEM) as work:
-            for name, scopes in {
-                "both": ("read", "upload"),
-                "read": ("read",),
-                "upload": ("upload",),
-            }.items():
-                service.tokens[name] = access.create_token(work, f"stand-{name}", scopes)
-        try:
-            yield service
-        finally:
-            for client in service.clients:
-                client.close()
+        yield Server(f"http://127.0.0.1:{port}", app)
     finally:
         server.should_exit = True
         thread.join()
+
+
+@contextmanager
+def visited(url: str, lab: Lab) -> Iterator[Service]:
+    """Tokens for a laboratory that is served there, and clients until the block ends."""
+    service = Service(url, lab, {})
+    with lab.write(access.SYSTEM) as work:
+        for name, scopes in {"both": ("read", "upload"), "read": ("read",), "upload": ("upload",)}.items():
+            service.tokens[name] = access.create_token(work, f"stand-{name}", scopes)
+    try:
+        yield service
+    finally:
+        for client in service.clients:
+            client.close()
+
+
+@contextmanager
+def running(settings: Settings, opening: Opening) -> Iterator[Service]:
+    """A service of one's own."""
+    with served(settings, opening) as server, visited(server.url, server.app.state.lab) as service:
+        yield service

@@ -4,7 +4,10 @@ from pathlib import Path
 import httpx
 import pytest
 import sqlalchemy as sa
-from serving import Service
+from serving import Service, running
+
+from app.main import Opening
+from app.settings import Settings
 
 
 @pytest.fixture
@@ -41,11 +44,13 @@ def test_not_ready_without_its_folder(service: Service, root: httpx.Client) -> N
     assert str(Path(service.lab.settings.data)) not in answer.text  # nobody has to know where
 
 
-def test_metrics(service: Service, root: httpx.Client) -> None:
-    service.client().get("/gyros/0417")
-    service.client().get("/gyros/0418")
-    root.get("/who/knows")
-    text = root.get("/metrics").text
+def test_metrics(settings: Settings, noting: Opening) -> None:
+    with running(settings, noting) as service:
+        root = service.client(None, "")
+        service.client().get("/gyros/0417")
+        service.client().get("/gyros/0418")
+        root.get("/who/knows")
+        text = root.get("/metrics").text
     lines = text.splitlines()
     assert (
         'driftbook_http_requests_total{method="GET",route="/api/v1/gyros/{serial}",status="404"} 2.0' in lines
