@@ -15,7 +15,7 @@ from babel.dates import format_date, format_datetime, format_time
 from app.i18n import LOCALE, MINUS, gettext, localised, ngettext
 
 DASH: Final = "\u2013"
-_BABEL: Final = {"en": "en_GB", "ru": "ru"}
+_BABEL: Final = {"en": "en", "ru": "ru"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +123,7 @@ def day(moment: date | datetime, *, short: bool = False) -> str:
     """``20 Nov 2026``, ``20.11.2026`` in Russian; `short` leaves out the year."""
     if LOCALE.get() == "ru":
         return format_date(moment, "dd.MM" if short else "dd.MM.yyyy", locale="ru")
-    return format_date(moment, "d MMM" if short else "d MMM yyyy", locale="en_GB")
+    return format_date(moment, "d MMM" if short else "d MMM yyyy", locale="en")
 
 
 def long_day(moment: date | datetime) -> str:
@@ -135,7 +135,7 @@ def long_day(moment: date | datetime) -> str:
 
 def clock(moment: datetime, *, seconds: bool = False) -> str:
     """Time of day, 24 hours, in the server's time zone."""
-    return format_time(moment.astimezone(), "HH:mm:ss" if seconds else "HH:mm", locale="en_GB")
+    return format_time(moment.astimezone(), "HH:mm:ss" if seconds else "HH:mm", locale="en")
 
 
 def instant(moment: datetime, *, now: datetime | None = None) -> str:
