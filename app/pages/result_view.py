@@ -100,13 +100,17 @@ class ResultPage:
 
     @property
     def warnings(self) -> list[str]:
-        """What a reader must know, of both methods, each once."""
-        found = [translate(message_from(item)) for item in self.main.get("warnings", ())]
-        for item in (self.paper or {}).get("warnings", ()):
-            text = translate(message_from(item))
-            if text not in found:
-                found.append(gettext("Paper’s iteration: %(text)s") % {"text": text})
-        return found
+        """What a reader must know; of the paper's method only what the main one does not say already."""
+        ours: Sequence[Json] = self.main.get("warnings", ())
+        codes = {item["code"] for item in ours}
+        theirs = [item for item in (self.paper or {}).get("warnings", ()) if item["code"] not in codes]
+        return [
+            *(translate(message_from(item)) for item in ours),
+            *(
+                gettext("Paper’s iteration: %(text)s") % {"text": translate(message_from(item))}
+                for item in theirs
+            ),
+        ]
 
     @property
     def fit(self) -> Json:
