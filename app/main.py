@@ -13,7 +13,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import Scope
 
-from app import api, logs, pages
+from app import api, logs, pages, plots
 from app.errors import AppError, Forbidden, problem
 from app.jobs.engine import JobEngine
 from app.middleware import BodyLimit, LastResort, RequestLog, SameSite, SecurityHeaders
@@ -61,9 +61,11 @@ def create_app(settings: Settings, opening: Opening = working_lab) -> FastAPI:
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         opened = opening(settings)
         app.state.lab = service.state.lab = await asyncio.to_thread(opened.__enter__)
+        charts = plots.warm_up()
         try:
             yield
         finally:
+            charts.cancel()
             await asyncio.to_thread(opened.__exit__, None, None, None)
 
     app = FastAPI(title="Driftbook", lifespan=lifespan, openapi_url=None)

@@ -12,8 +12,8 @@ from app.plots.convergence import Change, convergence
 from app.plots.drift import DriftEvent, DriftLimit, DriftPoint, drift
 from app.plots.record import Stretch, record
 from app.plots.residuals import LIMIT_SD, Place, Residual, decade, residuals
-from app.plots.template import warm_up
 from app.plots.theme import printed
+from app.plots.warming import warm_up
 
 __all__ = [
     "LIMIT_SD",

@@ -48,7 +48,7 @@ def convergence(changes: Sequence[Change], tolerance: float, tolerance_label: st
     smallest = min([tolerance, *(change.relative for change in shown)])
     largest = max([tolerance, *(change.relative for change in shown)])
     return filled(
-        _template(),
+        template(),
         data={
             **{
                 name: [
@@ -66,7 +66,8 @@ def convergence(changes: Sequence[Change], tolerance: float, tolerance_label: st
 
 
 @cache
-def _template() -> Spec:
+def template() -> Spec:
+    """The chart without its data, made once."""
     import altair as alt
 
     x = alt.X(

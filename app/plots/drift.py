@@ -69,9 +69,8 @@ def drift(
     ]  # fmt: skip
     near = [limit for limit in limits if _is_near(limit.value, reach)]
     low, high = axis_range([*reach, *(limit.value for limit in near)])
-    template = _template(with_dates)
     return filled(
-        template,
+        template(with_dates),
         data={
             "line": [_row(point) for point in points],
             "within": [_row(point) for point in points if point.state == "within"],
@@ -118,7 +117,8 @@ def _row(point: DriftPoint) -> dict[str, Any]:
 
 
 @cache
-def _template(with_dates: bool) -> Spec:
+def template(with_dates: bool) -> Spec:
+    """The chart without its data, made once."""
     import altair as alt
 
     dates = alt.Axis(

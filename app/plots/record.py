@@ -46,7 +46,7 @@ def record(
     """
     bottom, top = axis_range([*low, *high, *([] if mean is None else [mean])])
     return filled(
-        _template(channel),
+        template(channel),
         data={
             "trace": [{"t": t, "l": a, "h": b} for t, a, b in zip(t_s, low, high, strict=True)],
             "mean": [] if mean is None else [{"v": mean}],
@@ -61,7 +61,8 @@ def record(
 
 
 @cache
-def _template(channel: str) -> Spec:
+def template(channel: str) -> Spec:
+    """The chart without its data, made once."""
     import altair as alt
 
     colour = theme.colour("series-1" if channel == "x" else "series-2")

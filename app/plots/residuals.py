@@ -79,7 +79,7 @@ def residuals(
         if place.sd is not None
     ]
     return filled(
-        _template(),
+        template(),
         data={
             "x": [_row(point, scale) for point in points if point.axis == "x" and not point.beyond],
             "y": [_row(point, scale) for point in points if point.axis == "y" and not point.beyond],
@@ -115,7 +115,8 @@ def _labels(places: Sequence[Place]) -> list[list[str]]:
 
 
 @cache
-def _template() -> Spec:
+def template() -> Spec:
+    """The chart without its data, made once."""
     import altair as alt
 
     axis = alt.Axis(

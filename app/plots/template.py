@@ -1,6 +1,5 @@
 """From an Altair chart, written once, to the document of one request."""
 
-import threading
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -11,13 +10,13 @@ Row = Mapping[str, Any]
 
 
 def template_of(chart: Any) -> Spec:
-    """What Altair makes of a chart with named data, checked by it against Vega-Lite's schema.
+    """What Altair makes of a chart with named data; a test checks it against Vega-Lite's schema.
 
     Charts fill the width of their container and keep the size of their text.
     """
     spec: Spec = chart.properties(
         width="container", autosize={"type": "fit-x", "contains": "padding"}, padding=0
-    ).to_dict()
+    ).to_dict(validate=False)
     spec.pop("config", None)
     return spec
 
@@ -61,15 +60,6 @@ def filled(
         "params": params,
         "datasets": {name: [dict(row) for row in rows] for name, rows in data.items()},
     }
-
-
-def warm_up() -> None:
-    """Import Altair in the background, so that nobody waits for it."""
-    threading.Thread(target=_import, name="charts", daemon=True).start()
-
-
-def _import() -> None:
-    import altair  # noqa: F401
 
 
 def axis_range(values: Iterable[float], *, margin: float = 0.08) -> tuple[float, float]:

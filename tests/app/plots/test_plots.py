@@ -5,12 +5,16 @@ import re
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+import altair
+import jsonschema
 import pytest
 import vl_convert
 
 from app import plots
 from app.i18n import speaking
 from app.plots import theme
+from app.plots.drift import template as drift_template
+from app.plots.warming import make_templates
 
 STYLESHEET = Path(theme.__file__).parents[1] / "static" / "style.css"
 BEGIN = datetime(2026, 1, 1, tzinfo=UTC)
@@ -85,6 +89,21 @@ def test_a_chart_is_plain_json_with_a_description(chart):
     assert json.loads(json.dumps(spec)) == spec
     assert spec["description"]
     assert spec["width"] == "container"
+
+
+@pytest.mark.parametrize("chart", CHARTS.values(), ids=CHARTS)
+def test_a_chart_keeps_to_vega_lites_schema(chart):
+    altair.LayerChart.from_dict(chart(), validate=True)
+
+
+def test_the_schema_would_object():
+    with pytest.raises(jsonschema.ValidationError):
+        altair.LayerChart.from_dict({**residual_chart(), "height": "tall"}, validate=True)
+
+
+def test_templates_are_made_beforehand():
+    make_templates()
+    assert drift_template.cache_info().currsize == 2
 
 
 @pytest.mark.parametrize("chart", CHARTS.values(), ids=CHARTS)

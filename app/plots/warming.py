@@ -1,0 +1,35 @@
+"""Getting ready before somebody asks: Altair takes a second or two to import and to think."""
+
+import threading
+from typing import Final
+
+from app.plots.convergence import template as convergence_template
+from app.plots.drift import template as drift_template
+from app.plots.record import template as record_template
+from app.plots.residuals import template as residuals_template
+
+_DELAY_S: Final = 2.0
+
+
+def warm_up() -> threading.Timer:
+    """Make every chart's template in the background, a little after the service has started.
+
+    Returns
+    -------
+    threading.Timer
+        To be cancelled when the service stops before that.
+    """
+    timer = threading.Timer(_DELAY_S, make_templates)
+    timer.daemon = True
+    timer.start()
+    return timer
+
+
+def make_templates() -> None:
+    """Make what every later chart is filled from; done once in a process."""
+    residuals_template()
+    convergence_template()
+    for with_dates in (True, False):
+        drift_template(with_dates)
+    for channel in ("x", "y"):
+        record_template(channel)
