@@ -11,4 +11,6 @@ def checked_name(value: str, column: str) -> str:
     if any(character in value for character in "/?#\\") or not value.isprintable() or value in (".", ".."):
         raise Invalid(problem("bad-name", "“%(value)s” has a character that a name cannot have (/ ? # \\).",
                               column=column, value=value))  # fmt: skip
+    if value == "new":
+        raise Invalid(problem("reserved-name", "“new” is an address of the pages; choose another name.", column=column))
     return value

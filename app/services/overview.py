@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from app.services import sessions
 from app.services.lab import Work
 from app.services.views import SessionDetail, SessionView
+from app.store import measurement
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,22 +24,25 @@ class Overview:
     recent: tuple[SessionView, ...]
 
 
-_OPEN = ("measuring", "ready", "solving", "failed")
+_UNDER_WAY = ("measuring", "ready", "solving")
+_MOST_OPEN = 20
 
 
 def overview(work: Work, limit: int = 12) -> Overview:
-    """The technician's queue: the newest open session in full, and the latest sessions."""
+    """The technician's queue: the newest open session in full, open sessions, then the latest."""
+    unsolved = _unsolved(work)
     latest = sessions.sessions(work, limit=limit).items
-    waiting = [item for item in latest if item.state in ("measuring", "ready")]
-    recent = tuple(sorted(latest, key=lambda item: item.state not in _OPEN))
+    known = {item.id for item in unsolved}
+    recent = (*unsolved, *(item for item in latest if item.id not in known))[:limit]
+    waiting = [item for item in unsolved if item.state in ("measuring", "ready")]
     return Overview(sessions.detail(work, waiting[0].id) if waiting else None, recent)
 
 
 def stands_now(work: Work, stand_names: tuple[str, ...]) -> tuple[StandNow, ...]:
-    """Each stand with its newest session, if that is still open."""
-    found = []
-    for name in stand_names:
-        newest = sessions.sessions(work, stand=name, limit=1).items
-        session = newest[0] if newest and newest[0].state in ("measuring", "ready", "solving") else None
-        found.append(StandNow(name, session))
-    return tuple(found)
+    """Each stand with its newest session that is under way, if there is one."""
+    open_ones = {item.stand: item for item in reversed(_unsolved(work)) if item.state in _UNDER_WAY}
+    return tuple(StandNow(name, open_ones.get(name)) for name in stand_names)
+
+
+def _unsolved(work: Work) -> tuple[SessionView, ...]:
+    return sessions.views(work, measurement.unsolved(work.db, _MOST_OPEN))

@@ -6,7 +6,7 @@ from datetime import datetime
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from app.store.tables import Gyro, Measurement, MeasuringSession, Record, Stand
+from app.store.tables import Calibration, Gyro, Measurement, MeasuringSession, Record, Stand
 
 
 def session(db: Session, session_id: int) -> MeasuringSession | None:
@@ -37,6 +37,14 @@ def sessions(
     if before is not None:
         query = query.where(MeasuringSession.id < before)
     return db.scalars(query).all()
+
+
+def unsolved(db: Session, limit: int) -> Sequence[MeasuringSession]:
+    """Sessions without any result, the newest first."""
+    solved = sa.exists().where(Calibration.session_id == MeasuringSession.id)
+    return db.scalars(
+        sa.select(MeasuringSession).where(~solved).order_by(MeasuringSession.id.desc()).limit(limit)
+    ).all()
 
 
 def revisions(db: Session, session_id: int) -> Sequence[Measurement]:
