@@ -26,14 +26,6 @@
     const { view } = await window.vegaEmbed(place, { ...chart.spec, width }, options);
     chart.view?.finalize();
     chart.view = view;
-    // A point is a link for the keyboard too; Vega makes it one for the mouse only.
-    for (const mark of place.querySelectorAll("[role=graphics-symbol][aria-label]")) {
-      const href = mark.__data__?.href;
-      if (!href) continue;
-      mark.setAttribute("role", "link");
-      mark.setAttribute("tabindex", "0");
-      mark.addEventListener("keydown", (event) => { if (event.key === "Enter") location.assign(href); });
-    }
     // Vega gives marks of no point the role of a picture: without a name it would be one nobody can read.
     for (const mark of place.querySelectorAll("[role=graphics-symbol]:not([aria-label])")) {
       if (!mark.childElementCount) mark.setAttribute("aria-hidden", "true");
