@@ -102,7 +102,15 @@ def _about_measurement(observations: Observations) -> list[Message]:
     warnings = []
     duration, rate = observations.duration, observations.rate
     unknown = np.isnan(duration) | np.isnan(rate)
-    if unknown.any():
+    if unknown.all():
+        warnings.append(
+            Message(
+                "duration-unknown",
+                "Duration or sampling rate is not given for any position, so the measurement rule (60 s at "
+                "200 Hz) cannot be checked.",
+            )
+        )
+    elif unknown.any():
         warnings.append(
             Message(
                 "duration-unknown",
@@ -113,7 +121,14 @@ def _about_measurement(observations: Observations) -> list[Message]:
         )
     least = 1.0 - RULE_TOLERANCE
     below = (duration < LEAST_DURATION * least) | (rate < LEAST_RATE * least)
-    if below.any():
+    if below.all():
+        warnings.append(
+            Message(
+                "below-method",
+                "Every position was measured for less than 60 s or at less than 200 Hz: below the method.",
+            )
+        )
+    elif below.any():
         warnings.append(
             Message(
                 "below-method",
@@ -161,13 +176,11 @@ def _about_fit(estimate: Estimate, observations: Observations) -> list[Message]:
 
 
 def _named(marked: NDArray[np.bool_], observations: Observations) -> str:
-    """Name the marked positions: ``θ 0° ψ 90°, θ 90° ψ 0° (repeat 1)``."""
-    if marked.all() and len(marked) > 1:
-        return "all positions"
+    """Name the marked positions in no language: ``θ 0° ψ 90°, θ 90° ψ 0° ·2`` (its first repeat), ``… (+3)``."""
     places = []
     for row in np.flatnonzero(marked)[:_MOST_NAMED]:
         theta, psi = (deg_from_rad(float(angle[row])) for angle in (observations.theta, observations.psi))
         repeat = int(observations.repeat[row])
-        places.append(f"θ {theta:.6g}° ψ {psi:.6g}°" + (f" (repeat {repeat})" if repeat else ""))
+        places.append(f"θ {theta:.6g}° ψ {psi:.6g}°" + (f" ·{repeat + 1}" if repeat else ""))
     more = int(marked.sum()) - len(places)
-    return ", ".join(places) + (f" and {more} more" if more else "")
+    return ", ".join(places) + (f", … (+{more})" if more else "")
