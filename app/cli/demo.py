@@ -8,7 +8,7 @@ from typing import Annotated
 import platformdirs
 import typer
 
-from app.cli.service import Port, run
+from app.cli.service import Port, listen, run
 from app.errors import Conflict, problem
 from app.services import access, demonstration
 from app.services.access import SYSTEM
@@ -28,14 +28,15 @@ def demo(
     """Make a demonstration laboratory, then serve it with a sign-in link."""
     folder = data or Path(platformdirs.user_data_dir("driftbook-demo", appauthor=False))
     lab_settings = Settings(data=folder)
+    listening = listen("127.0.0.1", port) if serve else None
     _prepare(folder, reset)
     if not (folder / _MARK).exists():
         _build(lab_settings)
     typer.echo(f"Laboratory: {folder}")
-    if serve:
+    if listening is not None:
         with open_lab(lab_settings) as lab, lab.write(SYSTEM) as work:
             secret = access.make_sign_in_link(work, demonstration.DEMO_ACCOUNT, _LINK_VALID)
-        run(lab_settings, "127.0.0.1", port, lambda url: _announce(url, secret))
+        run(lab_settings, listening, lambda url: _announce(url, secret))
 
 
 def _prepare(folder: Path, reset: bool) -> None:

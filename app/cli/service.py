@@ -25,9 +25,8 @@ def serve(
     data: Data = None,
 ) -> None:
     """Run the service with its workers: pages, API and jobs."""
-    run(
-        replace(settings(data), workers=workers), host, port, lambda url: typer.echo(f"Driftbook is on {url}")
-    )
+    listening = listen(host, port)
+    run(replace(settings(data), workers=workers), listening, lambda url: typer.echo(f"Driftbook is on {url}"))
 
 
 def migrate(data: Data = None) -> None:
@@ -36,20 +35,13 @@ def migrate(data: Data = None) -> None:
         typer.echo(f"{lab.settings.data} is up to date.")
 
 
-def run(lab_settings: Settings, host: str, port: int, ready: Callable[[str], None]) -> None:
-    """Serve until interrupted; `ready` is called with the address once requests are answered.
-
-    Raises
-    ------
-    Conflict
-        The port is taken.
-    """
-    listening = _listen(host, port)
-    shown = f"[{host}]" if ":" in host else host
-    url = f"http://{shown}:{listening.getsockname()[1]}"
+def run(lab_settings: Settings, listening: socket.socket, ready: Callable[[str], None]) -> None:
+    """Serve until interrupted; `ready` is called with the address once requests are answered."""
     config = uvicorn.Config(
         create_app(lab_settings), log_config=None, timeout_graceful_shutdown=_GRACE_S, access_log=False
     )
+    host, port = listening.getsockname()[:2]
+    url = f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
     _Announcing(config, lambda: ready(url)).run(sockets=[listening])
 
 
@@ -67,7 +59,14 @@ class _Announcing(uvicorn.Server):
             self._ready()
 
 
-def _listen(host: str, port: int) -> socket.socket:
+def listen(host: str, port: int) -> socket.socket:
+    """Take the port.
+
+    Raises
+    ------
+    Conflict
+        Somebody else has it.
+    """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listening = socket.socket(family, socket.SOCK_STREAM)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
