@@ -217,13 +217,17 @@ def kill_at_random(service: Service) -> None:
 
 def wait_for_jobs(url: str, token: str, jobs: list[str]) -> dict[str, str]:
     states: dict[str, str] = {}
+    found: dict[str, dict[str, object]] = {}
     end = time.monotonic() + PATIENCE_S
     with httpx.Client(base_url=url + "/api/v1", headers={"Authorization": f"Bearer {token}"}) as client:
         while time.monotonic() < end:
-            states = {job: client.get(f"/jobs/{job}").json()["state"] for job in jobs}
+            found = {job: client.get(f"/jobs/{job}").json() for job in jobs}
+            states = {job: item["state"] for job, item in found.items()}
             if not {"queued", "running"} & set(states.values()):
                 break
             time.sleep(0.5)
+    reasons = [item["error"] for item in found.values() if item["error"]]
+    assert not reasons, reasons
     return states
 
 
