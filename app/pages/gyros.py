@@ -167,10 +167,7 @@ def _chosen(found: Sequence[GyroView], wanted: Selection) -> list[GyroView]:
 
 def _ordered(found: list[GyroView], sort: str) -> list[GyroView]:
     key = _SORTS.get(sort.removeprefix("-"), _SORTS["status"])
-    downwards = sort.startswith("-")
-    if key is _SORTS["status"]:
-        downwards = not downwards  # the worst is the highest
-    return sorted(sorted(found, key=_SORTS["serial"]), key=key, reverse=downwards)
+    return sorted(sorted(found, key=_SORTS["serial"]), key=key, reverse=sort.startswith("-"))
 
 
 def _counts(found: Sequence[GyroView], key: Callable[[GyroView], str]) -> dict[str, int]:

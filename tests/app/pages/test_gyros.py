@@ -34,6 +34,14 @@ def test_the_list_is_narrowed_by_type_status_and_text(technician: TestClient, se
     assert "No gyro fits this selection" in nothing
 
 
+def test_what_needs_a_hand_comes_first(technician: TestClient, stocked: Lab, result: int) -> None:
+    with stocked.write(access.SYSTEM) as work:
+        gyros.set_limits(work, "GVK-6", {"w0x": (-0.1, 0.1)})  # 0417's fixed drift is 1.5 °/h
+        gyros.add_gyro(work, "0400", "GVK-6")
+    assert _serials(technician.get("/gyros").text) == ["0417", "0400"]
+    assert _serials(technician.get("/gyros?sort=status").text) == ["0400", "0417"]
+
+
 def test_counts_follow_the_rest_of_the_selection(technician: TestClient, several: Lab) -> None:
     page = technician.get("/gyros?type=GVK-6").text
     assert 'Not calibrated</span> <span class="n">2</span>' in page
