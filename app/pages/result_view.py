@@ -14,7 +14,7 @@ from app.services.views import COVERAGE_FACTOR, CalibrationView, MeasurementView
 from solver.records import PARAMETERS
 
 TOLERANCE: Final = 1e-12
-_FLOOR_RATE: Final = 1e-3  # °/h, and part of Kx: below, a change is judged against this size (spec 1.5)
+_FLOOR_RATE: Final = 1e-3  # °/h, and part of Kx: below, a change is judged against this size
 _ITERATED: Final = ("kx", "ky", "kxy", "kyx", "wg", "wk")
 _GAUGE: Final = (6.0, 82.0)
 

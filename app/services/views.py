@@ -223,7 +223,7 @@ class SessionDetail:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationView:
-    """A result with its provenance. `result` is the document of the interface (spec 3.4)."""
+    """A result with its provenance. `result` is the result document, in laboratory units."""
 
     id: int
     session: SessionView

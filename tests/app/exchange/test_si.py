@@ -131,7 +131,7 @@ def test_nothing_measured_is_refused() -> None:
 
 
 def test_a_scale_factor_of_ten_is_the_papers_example() -> None:
-    # 10 rad/(s·A) = 10·(180/π)·3600/1000 °/h/mA (spec 3.4 shows 2062.65).
+    # 10 rad/(s·A) = 10·(180/π)·3600/1000 °/h/mA = 2062.65.
     assert parameter_lab("kx", 10.0) == pytest.approx(10 * 180 / math.pi * 3.6, rel=TWO_ROUNDINGS)
     assert parameter_si("w0x", 1.0) == pytest.approx(math.pi / 180 / 3600, rel=TWO_ROUNDINGS)
     for name in PARAMETERS:

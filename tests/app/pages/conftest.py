@@ -132,7 +132,7 @@ def stocked(lab: Lab) -> Lab:
 
 
 def currents_ma(theta_deg: float, psi_deg: float) -> tuple[float, float]:
-    """Torquer currents of a gyro without misalignment at 55.7558° (spec 1.2 to 1.4), with a little noise.
+    """Torquer currents of a gyro without misalignment at 55.7558° (paper, eq. (7) to (15)), with a little noise.
 
     K = 2063 °/h/mA on both axes, no cross-coupling, ω0 = (1.5, −0.75) °/h, ωg = 0.9, ωк = −0.2 °/h/g.
     """

@@ -57,7 +57,7 @@ def test_the_truth_comes_back_within_four_u(lab, measured, bench):
     truth = truth_values(bench.gyro)
     for name, parameter in view.summary.parameters.items():
         # Eight normal deviates beyond 4 u: p = 8 · 6e-5. The certificate's 0.5″ adds about 2 ppm of K and
-        # 2e-5 °/h (spec of the method, 1.7), small against u.
+        # 2e-5 °/h, small against u.
         assert abs(parameter.value - truth[name]) < 4 * parameter.u, name
 
 
