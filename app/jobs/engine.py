@@ -31,7 +31,7 @@ _WORKFLOW: Final = "run_job"
 # before an upgrade. Nothing of a job lies in DBOS but its id, so one version does for ever.
 _VERSION: Final = "1"
 # The ledger counts attempts and decides; this only ends what never reaches the ledger.
-_MAX_RECOVERIES: Final = 20
+_MAX_RECOVERIES: Final = 200
 _KILL_S: Final = 10.0
 _log = structlog.get_logger(__name__)
 

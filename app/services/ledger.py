@@ -17,9 +17,10 @@ from app.services.lab import Lab, Person, Work
 from app.store import results
 from app.store.tables import Job
 
-MAX_ATTEMPTS: Final = 10
-"""How often a job is begun at the most. Restarts count too; the engine itself ends a job whose own
-child process keeps dying sooner (`app.jobs.ledger.MAX_CRASHES`)."""
+MAX_ATTEMPTS: Final = 100
+"""How often a job is begun at the most. Interruptions of the whole service count, and somebody who
+restarts it thirty times must lose nothing; a job whose own child process keeps dying is ended much
+sooner, by the engine (`app.jobs.ledger.MAX_CRASHES`)."""
 
 
 @dataclass(frozen=True, slots=True)
