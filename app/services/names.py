@@ -12,5 +12,7 @@ def checked_name(value: str, column: str) -> str:
         raise Invalid(problem("bad-name", "“%(value)s” has a character that a name cannot have (/ ? # \\).",
                               column=column, value=value))  # fmt: skip
     if value == "new":
-        raise Invalid(problem("reserved-name", "“new” is an address of the pages; choose another name.", column=column))
+        raise Invalid(
+            problem("reserved-name", "“new” is an address of the pages; choose another name.", column=column)
+        )
     return value
