@@ -24,7 +24,7 @@ class Problem:
     row
         Line of the file as an editor counts it (the header is line 1), or row of a table.
     column
-        Name of the column or field.
+        Name of the column or field, or a command's option.
     """
 
     message: Message
@@ -35,7 +35,9 @@ class Problem:
     @property
     def where(self) -> str:
         """``currents.csv, row 7, column jx_ma`` as far as it is known."""
-        parts = [self.file, self.row and f"row {self.row}", self.column and f"column {self.column}"]
+        option = self.column is not None and self.column.startswith("--")
+        column = self.column if option else self.column and f"column {self.column}"
+        parts = [self.file, self.row and f"row {self.row}", column]
         return ", ".join(part for part in parts if part)
 
     @property

@@ -12,7 +12,7 @@ from typing import Final, NoReturn
 import structlog
 import typer
 from typer._click.core import Command, Context
-from typer._click.exceptions import ClickException
+from typer._click.exceptions import ClickException, NoArgsIsHelpError
 from typer.core import TyperGroup
 from typer.main import get_command
 
@@ -45,7 +45,9 @@ class _Commands(TyperGroup):
             alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
             alone.command(cmd_name)(found)
             found = alone
-        return get_command(found)
+        command = get_command(found)
+        command.name = cmd_name  # a group has none of its own, and the help lists commands by it
+        return command
 
 
 commands = typer.Typer(
@@ -73,8 +75,14 @@ def main() -> None:
     except AppError as error:
         first, more = error.problems[0].text, len(error.problems) - 1
         _refuse(first + (f" (and {more} more)" if more else ""))
+    except NoArgsIsHelpError:  # the help has been shown
+        sys.exit(2)
     except ClickException as error:
         _refuse(error.format_message())
+    except OSError as error:
+        if error.filename is None:
+            raise
+        _refuse(f"{error.filename}: {error.strerror}. Check the path and who may write there.")
 
 
 def _refuse(sentence: str) -> NoReturn:

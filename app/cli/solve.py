@@ -3,7 +3,7 @@
 import json
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -91,8 +91,11 @@ def _solve_one(
                 file=item.name,
             )
         )
-    means = session.measured()
-    output = solved(means, rows, latitude_deg, method.value)
+    try:
+        means = session.measured()
+        output = solved(means, rows, latitude_deg, method.value)
+    except AppError as error:  # what is wrong between files has no file of its own: it is this item's
+        raise type(error)(*(replace(one, file=one.file or item.name) for one in error.problems)) from error
     result: dict[str, Any] = json.loads(output["result"])
     warnings = [*session.warnings, *_differences(session, rows, named, latitude_deg)]
     incomplete = incomplete_uncertainties(means)

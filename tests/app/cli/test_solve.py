@@ -172,6 +172,9 @@ def test_several_items_give_a_line_each_and_a_bad_one_does_not_stop_the_others(d
         (["simulate", "--out", "{case}/x", "--scenario", "mars"], "no scenario mars"),
         (["simulate", "--out", "{case}/x", "--positions", "0/0,ninety"], "ninety"),
         (["nonsense"], "nonsense"),
+        (["simulate", "--out", "{case}/currents.csv/x"], "{case}/currents.csv/x: Not a directory"),
+        (["migrate", "--data", "{case}/currents.csv"], "{case}/currents.csv"),
+        (["token", "create", "rig", "--data", "{case}/currents.csv"], "{case}/currents.csv"),
     ],
 )
 def test_bad_usage_is_one_line_and_exit_code_2(driftbook, tmp_path, arguments, words):
@@ -179,7 +182,7 @@ def test_bad_usage_is_one_line_and_exit_code_2(driftbook, tmp_path, arguments, w
     done = driftbook(*(str(item).format(case=case) for item in arguments))
     assert done.code == 2
     assert len(done.err.strip().splitlines()) == 1
-    assert words in done.err
+    assert words.format(case=case) in done.err
     assert "Traceback" not in done.err
 
 
@@ -195,3 +198,29 @@ def test_the_command_line_wins_over_the_sessions_files_and_says_so(driftbook, tm
     driftbook("simulate", "--out", tmp_path / "s", "--seed", 7, "--duration", 2, "--latitude", 50)
     result = json.loads(driftbook("solve", tmp_path / "s", "--latitude", 51, "--json").out)
     assert "latitude-differs" in [item["code"] for item in result["input_warnings"]]
+
+
+def test_the_help_lists_every_command_by_name(driftbook):
+    words = driftbook("--help").out.split()
+    for name in ("demo", "serve", "migrate", "solve", "simulate", "upload", "user", "token"):
+        assert name in words
+    alone = driftbook()
+    assert (alone.code, alone.err) == (2, "")
+
+
+@pytest.mark.parametrize(
+    ("cut", "method", "words"),
+    [(slice(1, None), "paper", "(0°, 0°)"), (slice(None), "least-squares", "row 18")],
+)
+def test_what_is_wrong_between_files_names_the_file(driftbook, tmp_path, cut, method, words):
+    case = write_case(tmp_path / "case", SIXTEEN, 50.0, TRUTH, 15)
+    header, *rows = (case / "currents.csv").read_text().splitlines()
+    rows = rows[cut] + (["33,44,0.001,0.001"] if method != "paper" else [])
+    (case / "currents.csv").write_text("\n".join([header, *rows]) + "\n")
+    done = driftbook(
+        "solve", case / "currents.csv", "--certificate", case / "certificate.csv",
+        "--latitude", 50, "--method", method,
+    )  # fmt: skip
+    assert done.code == 2
+    assert done.err.startswith(f"driftbook: {case / 'currents.csv'}")
+    assert words in done.err
