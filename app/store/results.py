@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 
 import sqlalchemy as sa
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, aliased
 
 from app.store.tables import (
     Calibration,
@@ -124,11 +124,24 @@ def series(
     since: datetime | None = None,
     until: datetime | None = None,
 ) -> Sequence[tuple[CalibrationParameter, Calibration]]:
-    """One method's parameters of a gyro over time, of each session the highest revision only."""
+    """One method's parameters of a gyro over time, of each session the highest revision that used it.
+
+    Only results from the same input as the session's highest revision count: what a corrected
+    measurement has replaced is gone, but solving once more by another method hides nothing.
+    """
+    last = sa.select(sa.func.max(Calibration.id)).group_by(Calibration.session_id)
+    latest = aliased(Calibration)
     newest = (
         sa.select(sa.func.max(Calibration.id))
+        .join(CalibrationParameter, CalibrationParameter.calibration_id == Calibration.id)
+        .join(
+            latest,
+            sa.and_(latest.session_id == Calibration.session_id, latest.input_hash == Calibration.input_hash),
+        )
         .join(MeasuringSession, MeasuringSession.id == Calibration.session_id)
-        .where(MeasuringSession.gyro_id == gyro_id)
+        .where(
+            MeasuringSession.gyro_id == gyro_id, latest.id.in_(last), CalibrationParameter.method == method
+        )
         .group_by(Calibration.session_id)
     )
     query = (

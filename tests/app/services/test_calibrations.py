@@ -95,6 +95,27 @@ def test_a_corrected_position_gives_a_revision_that_says_what_it_replaces(lab, m
     assert [point.calibration for point in points] == [second], "a session counts once in the history"
 
 
+def test_solving_once_more_by_the_papers_method_hides_nothing_from_the_history(lab, measured, currents):
+    first = run(lab, ask(lab, measured, "least-squares").id).calibration
+    second = run(lab, ask(lab, measured, "paper").id).calibration
+    assert _in_history(lab) == ([first], [second])
+    with lab.write(SYSTEM) as work:
+        ingest.save_means(work, measured, currents(0), ingest.Source("typed"))
+    third = run(lab, ask(lab, measured, "paper").id).calibration
+    assert _in_history(lab) == ([], [third]), "a value of measurements since corrected has no place there"
+
+
+def _in_history(lab):
+    with lab.read(SYSTEM) as work:
+        return tuple(
+            [
+                point.calibration
+                for point in history.history(work, "0417", parameter="wg", method=method)[0].points
+            ]
+            for method in ("least-squares", "paper")
+        )
+
+
 def test_a_request_while_the_same_one_waits_gives_the_same_job(lab, measured, queue):
     assert ask(lab, measured).id == ask(lab, measured).id
     assert len(queue.queued) == 1
