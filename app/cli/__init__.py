@@ -5,17 +5,16 @@ what to do), 1 anything else.
 """
 
 import importlib
-import logging
 import sys
 from typing import Final, NoReturn
 
-import structlog
 import typer
 from typer._click.core import Command, Context
 from typer._click.exceptions import ClickException, NoArgsIsHelpError
 from typer.core import TyperGroup
 from typer.main import get_command
 
+from app import logs
 from app.errors import AppError
 
 _WHERE: Final = {
@@ -66,10 +65,7 @@ def _driftbook() -> None:
 
 def main() -> None:
     """Run the command line and exit."""
-    structlog.configure(
-        logger_factory=structlog.PrintLoggerFactory(sys.stderr),
-        wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
-    )
+    logs.configure()
     try:
         sys.exit(commands(standalone_mode=False))
     except AppError as error:
