@@ -2,6 +2,7 @@
 
 import socket
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import Annotated
 
@@ -10,7 +11,7 @@ import uvicorn
 
 from app.cli.options import Data, settings
 from app.errors import Conflict, problem
-from app.main import create_app
+from app.main import create_app, working_lab
 from app.services.opening import open_lab
 from app.settings import Settings
 
@@ -37,12 +38,15 @@ def migrate(data: Data = None) -> None:
 
 def run(lab_settings: Settings, listening: socket.socket, ready: Callable[[str], None]) -> None:
     """Serve until interrupted; `ready` is called with the address once requests are answered."""
-    config = uvicorn.Config(
-        create_app(lab_settings), log_config=None, timeout_graceful_shutdown=_GRACE_S, access_log=False
-    )
     host, port = listening.getsockname()[:2]
     url = f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
-    _Announcing(config, lambda: ready(url)).run(sockets=[listening])
+    # Opened here, not inside the server: what forbids it (a second service on the folder) is one line.
+    with listening, working_lab(lab_settings) as lab:
+        app = create_app(lab_settings, lambda _: nullcontext(lab))
+        config = uvicorn.Config(
+            app, log_config=None, timeout_graceful_shutdown=_GRACE_S, access_log=False, ws="none"
+        )
+        _Announcing(config, lambda: ready(url)).run(sockets=[listening])
 
 
 class _Announcing(uvicorn.Server):
