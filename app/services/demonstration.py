@@ -29,7 +29,7 @@ from solver.units import ma_from_ampere, rad_from_deg
 
 SEED: Final = 2026
 LATITUDE_DEG: Final = 55.7558
-SESSIONS: Final = 17
+SESSIONS: Final = 13
 """Sessions of each gyro over the year."""
 DEMO_ACCOUNT: Final = "sokolov"
 _PEOPLE: Final = (("petrova", "I. Petrova", "technician"), (DEMO_ACCOUNT, "A. Sokolov", "metrologist"),
