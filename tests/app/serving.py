@@ -1,7 +1,8 @@
 """The whole service over real HTTP, in a folder of the test's own."""
 
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -66,6 +67,14 @@ def ready(client: httpx.Client) -> httpx.Client:
         made = client.post(path, json=body)
         assert made.status_code == 201, made.text
     return client
+
+
+def wait_until(happened: Callable[[], Any]) -> None:
+    """Wait for what the service does after its answer."""
+    deadline = time.monotonic() + 10
+    while not happened():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
 
 
 def opened(client: httpx.Client, **said: Any) -> int:

@@ -1,11 +1,12 @@
 import json
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
 import sqlalchemy as sa
 import structlog
-from serving import NotingQueue, Service, running
+from serving import NotingQueue, Service, running, wait_until
 
 from app.main import Opening, create_app
 from app.middleware import POLICY
@@ -127,15 +128,19 @@ def test_a_traceback_shows_no_variables(
 
 
 def test_one_line_for_each_request(service: Service) -> None:
+    def requests() -> list[Any]:
+        return [line for line in lines if line["event"] == "request"]
+
     with structlog.testing.capture_logs() as lines:
         service.client().get("/gyros/0417")
+        wait_until(requests)  # a line is written after its answer
         service.client(None, "").get("/sign-in/link/hidden-link")
-    requests = [line for line in lines if line["event"] == "request"]
-    shown = [(line["method"], line["path"], line["status"]) for line in requests]
-    assert shown[0] == ("GET", "/api/v1/gyros/0417", 404)
-    assert shown[1][:2] == ("GET", "/sign-in/link/{secret}")
-    assert "hidden" not in json.dumps(requests)
-    assert all(line["duration_ms"] > 0 for line in requests)
+        wait_until(lambda: len(requests()) > 1)
+    api, page = [(line["method"], line["path"], line["status"]) for line in requests()]
+    assert api == ("GET", "/api/v1/gyros/0417", 404)
+    assert page[:2] == ("GET", "/sign-in/link/{secret}")
+    assert "hidden" not in json.dumps(requests())
+    assert all(line["duration_ms"] > 0 for line in requests())
 
 
 def test_behind_a_proxy_the_configured_origin_counts(settings: Settings) -> None:

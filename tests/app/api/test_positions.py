@@ -3,8 +3,6 @@ import hashlib
 import io
 import socket
 import threading
-import time
-from collections.abc import Callable
 from typing import Any
 
 import httpx
@@ -12,7 +10,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import structlog
-from serving import Service
+from serving import Service, wait_until
 
 MEANS = {"jx_ma": 0.004536, "jy_ma": -0.002117, "duration_s": 60, "rate_hz": 200}
 CSV, PARQUET = {"content-type": "text/csv"}, {"content-type": "application/vnd.apache.parquet"}
@@ -171,10 +169,3 @@ def test_a_client_that_goes_away_leaves_nothing(service: Service, session_id: in
         wait_until(lambda: [line for line in lines if line["event"] == "request"])
     assert list(service.lab.settings.uploads.iterdir()) == []
     assert [line for line in lines if line["log_level"] == "error"] == []
-
-
-def wait_until(happened: Callable[[], Any]) -> None:
-    deadline = time.monotonic() + 10
-    while not happened():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
