@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 from solver.errors import InputError, Message
 
 Array = NDArray[np.float64]
-Method = Literal["least-squares", "paper"]
+Method = Literal["least-squares", "generalised", "robust", "paper"]
 UncertaintyBasis = Literal["given", "scatter", "none"]
 
 PARAMETERS: Final = ("kx", "ky", "kxy", "kyx", "w0x", "w0y", "wg", "wk")
 """The eight parameters, in the order of every vector and matrix."""
+_MAY_BE_UNKNOWN: Final = frozenset({"duration", "rate", "time"})
+_DESCRIBING: Final = _MAY_BE_UNKNOWN | {"u_alpha", "u_beta", "u_gamma", "dof_jx", "dof_jy"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +39,13 @@ class Observations:
         Their standard uncertainties, A; None when they are not known for every position.
     duration, rate : (n,) array
         Length of the measurement, s, and sampling rate, Hz; NaN where they are not given.
+    time : (n,) array
+        Middle of the measurement, s since the session's beginning; NaN where it is not known.
+    u_alpha, u_beta, u_gamma : (n,) array
+        Standard uncertainties of the certified misalignment, rad, independent from position to
+        position and common to the repeats of one; 0 where none is stated.
+    dof_jx, dof_jy : (n,) array
+        Degrees of freedom of u_jx and u_jy; infinite where they are not known.
     latitude : float
         Of the stand, rad, south negative.
     """
@@ -53,6 +62,12 @@ class Observations:
     u_jy: Array | None
     duration: Array
     rate: Array
+    time: Array
+    u_alpha: Array
+    u_beta: Array
+    u_gamma: Array
+    dof_jx: Array
+    dof_jy: Array
     latitude: float
 
     def __len__(self) -> int:
@@ -76,16 +91,22 @@ class Observations:
         u_jy: Array | None = None,
         duration: Array | None = None,
         rate: Array | None = None,
+        time: Array | None = None,
+        u_alpha: Array | None = None,
+        u_beta: Array | None = None,
+        u_gamma: Array | None = None,
+        dof_jx: Array | None = None,
+        dof_jy: Array | None = None,
     ) -> "Observations":
         """Sort rows by θ, ψ, repeat and check them once.
 
         Raises
         ------
         InputError
-            When shapes differ, a value is not finite, or an uncertainty is not positive.
+            When shapes differ, a value is not finite, or an uncertainty is not positive (of an angle: negative).
         """
         n = len(theta)
-        unknown = np.full(n, np.nan)
+        unknown, none, infinite = np.full(n, np.nan), np.zeros(n), np.full(n, np.inf)
         repeat = np.zeros(n, dtype=np.int64) if repeat is None else np.asarray(repeat, np.int64)
         order = np.lexsort((repeat, psi, theta))
         columns = {
@@ -93,15 +114,20 @@ class Observations:
             "jx": jx, "jy": jy, "u_jx": u_jx, "u_jy": u_jy,
             "duration": unknown if duration is None else duration,
             "rate": unknown if rate is None else rate,
+            "time": unknown if time is None else time,
+            "u_alpha": none if u_alpha is None else u_alpha,
+            "u_beta": none if u_beta is None else u_beta,
+            "u_gamma": none if u_gamma is None else u_gamma,
+            "dof_jx": infinite if dof_jx is None else dof_jx,
+            "dof_jy": infinite if dof_jy is None else dof_jy,
         }  # fmt: skip
-        optional = {"duration", "rate"}
         clean: dict[str, Array | None] = {}
         for name, column in columns.items():
             if column is None:
                 clean[name] = None
                 continue
             values = np.asarray(column, dtype=np.float64)
-            _check(values, name, n, may_be_nan=name in optional)
+            _check(values, name, n)
             clean[name] = values[order]
         if not abs(latitude) <= np.pi / 2:
             raise InputError(Message("bad-latitude", "The latitude must lie between −90° and 90°."))
@@ -111,13 +137,13 @@ class Observations:
         """SHA-256 over what the parameters are computed from: equal input, equal hash.
 
         The bytes are each field's name and its values, in their sorted order, as little-endian
-        binary64; −0.0 counts as 0.0. Duration and rate are left out: no parameter depends on them,
-        and means that are typed without them are the same means.
+        binary64; −0.0 counts as 0.0. What only describes the measurement or the uncertainty of its
+        certificate is left out: means that are typed without it are the same means.
         """
         digest = hashlib.sha256(b"driftbook-input-1")
         for item in fields(self):
             value = getattr(self, item.name)
-            if item.name in ("duration", "rate"):
+            if item.name in _DESCRIBING:
                 continue
             digest.update(item.name.encode() + b"\0")
             if value is not None:
@@ -125,19 +151,27 @@ class Observations:
         return "sha256:" + digest.hexdigest()
 
 
-def _check(values: Array, name: str, n: int, *, may_be_nan: bool) -> None:
+def _check(values: Array, name: str, n: int) -> None:
     if values.shape != (n,):
         raise InputError(
             Message("bad-shape", "%(name)s has %(got)s values for %(n)d positions.",
                     {"name": name, "got": values.size, "n": n})
         )  # fmt: skip
-    bad = np.isinf(values) if may_be_nan else ~np.isfinite(values)
+    if name.startswith("dof_"):
+        bad = ~(values > 0)
+    else:
+        bad = np.isinf(values) if name in _MAY_BE_UNKNOWN else ~np.isfinite(values)
     if bad.any():
         raise InputError(
             Message("not-finite", "%(name)s of row %(row)d is not a finite number.",
                     {"name": name, "row": int(np.argmax(bad)) + 1})
         )  # fmt: skip
-    if name.startswith("u_") and (values <= 0).any():
+    if name in ("u_alpha", "u_beta", "u_gamma") and (values < 0).any():
+        raise InputError(
+            Message("bad-uncertainty", "%(name)s of row %(row)d must not be negative.",
+                    {"name": name, "row": int(np.argmax(values < 0)) + 1})
+        )  # fmt: skip
+    if name in ("u_jx", "u_jy") and (values <= 0).any():
         raise InputError(
             Message("bad-uncertainty", "%(name)s of row %(row)d must be greater than zero.",
                     {"name": name, "row": int(np.argmax(values <= 0)) + 1})

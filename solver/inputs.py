@@ -1,0 +1,274 @@
+"""The inputs' uncertainty: how an error of any input shows in the residuals.
+
+To first order an error δz of the inputs changes the residuals by S·δz and, through an estimator
+``q = H·right_side`` of the observation equations, the parameters by ``δq = H·S·δz``. The columns of
+S are derivatives of the residuals (right side minus left side of (10)-(15)) by
+
+- the mean currents of each position: −K (paper, eqs. (10)-(15));
+- the certified misalignment α, β, γ of each position, through Ã = E·A·B (paper, eqs. (8), (9));
+- what all positions of a session have in common, `COMMON`: gain and offset of the ammeter, the
+  systematic part of the certificate's angles, the base's level and azimuth, latitude, gravity, and
+  the temperature at which the gyro was measured.
+
+An error counts as *true minus assumed*.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.error_model import design_matrix, earth_rate, right_side, scale_matrix
+from solver.errors import InputError, Message
+from solver.geometry import Elements, base, case_orientation, commanded, elements, misalignment
+from solver.records import PARAMETERS, Array, Observations
+
+COMMON: Final = (
+    "gain_x", "gain_y", "offset_x", "offset_y", "alpha", "beta", "gamma",
+    "level_1", "level_2", "azimuth", "latitude", "gravity", "temperature",
+)  # fmt: skip
+"""What all positions of a session share: relative gain, offset in A, angles in rad, relative gravity, K."""
+
+SOURCES: Final[Mapping[str, tuple[str, ...]]] = {
+    "currents": (),
+    "angles": (),
+    "ammeter-gain": ("gain_x", "gain_y"),
+    "ammeter-offset": ("offset_x", "offset_y"),
+    "angles-common": ("alpha", "beta", "gamma"),
+    "level": ("level_1", "level_2"),
+    "azimuth": ("azimuth",),
+    "latitude": ("latitude",),
+    "gravity": ("gravity",),
+    "temperature": ("temperature",),
+}
+"""Lines of the budget, in their order, with the common inputs that each one gathers."""
+
+_STEP: Final = 1e-4
+_TOLERANCE: Final = 1e-9
+
+
+def _none() -> Array:
+    return np.zeros(len(COMMON))
+
+
+def _infinite() -> Array:
+    return np.full(len(COMMON), np.inf)
+
+
+@dataclass(frozen=True, slots=True)
+class CommonUncertainty:
+    """Uncertainty of what all positions of a session share.
+
+    Attributes
+    ----------
+    standard : (13,) array
+        Standard uncertainties in the order of `COMMON`.
+    correlation : (13, 13) array
+        Their correlation coefficients.
+    dof : (13,) array
+        Degrees of freedom of each standard uncertainty.
+    temperature_coefficients : (8,) array
+        Change of each parameter per kelvin, in the order of `PARAMETERS`.
+    """
+
+    standard: Array = field(default_factory=_none)
+    correlation: Array = field(default_factory=lambda: np.eye(len(COMMON)))
+    dof: Array = field(default_factory=_infinite)
+    temperature_coefficients: Array = field(default_factory=lambda: np.zeros(len(PARAMETERS)))
+
+    @classmethod
+    def of(
+        cls,
+        standard: Mapping[str, float],
+        *,
+        correlation: Mapping[tuple[str, str], float] | None = None,
+        dof: Mapping[str, float] | None = None,
+        temperature_coefficients: Mapping[str, float] | None = None,
+    ) -> "CommonUncertainty":
+        """Gather from names; what is not named is zero, uncorrelated, of infinite degrees of freedom.
+
+        Raises
+        ------
+        InputError
+            When a name is unknown, a standard uncertainty negative or not finite, a correlation
+            coefficient beyond ±1, or the correlations contradict one another.
+        """
+        u, freedom, correlated = _none(), _infinite(), np.eye(len(COMMON))
+        for name, value in standard.items():
+            u[_index(name)] = value
+        for name, value in (dof or {}).items():
+            freedom[_index(name)] = value
+        for (one, other), value in (correlation or {}).items():
+            i, j = _index(one), _index(other)
+            correlated[i, j] = correlated[j, i] = value
+        coefficients = np.zeros(len(PARAMETERS))
+        for name, value in (temperature_coefficients or {}).items():
+            coefficients[PARAMETERS.index(name)] = value
+        _check(u, correlated, freedom)
+        return cls(u, correlated, freedom, coefficients)
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance in the order of `COMMON`, (13, 13)."""
+        return np.asarray(self.correlation * np.outer(self.standard, self.standard))
+
+
+def _index(name: str) -> int:
+    if name not in COMMON:
+        raise InputError(
+            Message("unknown-input", "There is no input “%(name)s”. Choose from %(names)s.",
+                    {"name": name, "names": ", ".join(COMMON)})
+        )  # fmt: skip
+    return COMMON.index(name)
+
+
+def _check(u: Array, correlation: Array, dof: Array) -> None:
+    for row, name in enumerate(COMMON):
+        if not (np.isfinite(u[row]) and u[row] >= 0 and dof[row] > 0):
+            raise InputError(
+                Message("bad-uncertainty", "The standard uncertainty of %(name)s must be finite and not negative, "
+                        "its degrees of freedom positive.", {"name": name})
+            )  # fmt: skip
+    if not (np.abs(correlation) <= 1).all() or np.linalg.eigvalsh(correlation)[0] < -_TOLERANCE:
+        raise InputError(
+            Message("bad-correlation", "The correlation coefficients contradict one another: no inputs can be "
+                    "correlated like that. Each lies between −1 and 1.")
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """Every uncertain input of a session, with its effect on the residuals.
+
+    Attributes
+    ----------
+    source : (s,) array of str
+        Line of the budget, a key of `SOURCES`, that each input belongs to.
+    sensitivity : (2n, s) array
+        S: derivative of the residuals by each input.
+    covariance : (s, s) array
+        Of the inputs.
+    dof : (s,) array
+        Degrees of freedom of each input's standard uncertainty.
+    """
+
+    source: NDArray[np.str_]
+    sensitivity: Array
+    covariance: Array
+    dof: Array
+
+    @property
+    def residual_covariance(self) -> Array:
+        """S·Σ·Sᵀ, (2n, 2n), (rad/s)²."""
+        whole = self.sensitivity @ self.covariance @ self.sensitivity.T
+        return (whole + whole.T) / 2
+
+
+def inputs_of(
+    observations: Observations,
+    parameters: Array,
+    common: CommonUncertainty | None = None,
+    u_currents: Array | None = None,
+) -> Inputs:
+    """Gather the uncertain inputs of a session around given parameters; those without uncertainty are left out.
+
+    Parameters
+    ----------
+    observations
+    parameters : (8,) array
+    common
+        None: nothing common is uncertain.
+    u_currents : (n, 2) array, optional
+        Noise of the mean currents, A, when `observations` does not tell it; without either, the
+        currents are left out.
+    """
+    at = observations
+    parts = []
+    if u_currents is None and at.u_jx is not None and at.u_jy is not None:
+        u_currents = np.stack((at.u_jx, at.u_jy), axis=1)
+    if u_currents is not None:
+        freedom = np.stack((at.dof_jx, at.dof_jy), axis=1)
+        parts.append(("currents", by_currents(len(at), parameters), u_currents.ravel(), freedom.ravel()))
+    columns, u = _angles(at, parameters)
+    parts.append(("angles", columns, u, np.full(len(u), np.inf)))
+    common = common or CommonUncertainty()
+    shared = by_common(at, parameters, common)
+    names = [next(line for line, members in SOURCES.items() if name in members) for name in COMMON]
+    source = np.array([line for line, _, u, _ in parts for _ in u] + names)
+    sensitivity = np.hstack([columns for _, columns, _, _ in parts] + [shared])
+    variances = np.concatenate([u for _, _, u, _ in parts] + [common.standard]) ** 2
+    covariance = np.diag(variances)
+    covariance[-len(COMMON) :, -len(COMMON) :] = common.covariance
+    dof = np.concatenate([freedom for _, _, _, freedom in parts] + [common.dof])
+    used = variances > 0
+    return Inputs(source[used], sensitivity[:, used], covariance[np.ix_(used, used)], dof[used])
+
+
+def by_currents(count: int, parameters: Array) -> Array:
+    """Derivative of the residuals by the currents, (2n, 2n): −K for every position."""
+    return np.asarray(np.kron(np.eye(count), -scale_matrix(parameters)), np.float64)
+
+
+def by_angles(observations: Observations, parameters: Array) -> Array:
+    """Derivative of each position's two residuals by its α, β, γ, (n, 2, 3)."""
+    at = observations
+
+    def turned(step: Array) -> Array:
+        orientation = misalignment(at.alpha + step[0], at.beta + step[1], at.gamma + step[2])
+        return _residuals(elements(orientation @ commanded(at.theta, at.psi)), observations, parameters)
+
+    return np.stack([_central(turned, np.eye(3)[axis]) for axis in range(3)], axis=-1).reshape(-1, 2, 3)
+
+
+def by_common(observations: Observations, parameters: Array, common: CommonUncertainty) -> Array:
+    """Derivative of the residuals by what is in common, (2n, 13), in the order of `COMMON`."""
+    at = observations
+    here = elements(case_orientation(at.theta, at.psi, at.alpha, at.beta, at.gamma))
+    design = design_matrix(here, at.jx, at.jy)
+    k = scale_matrix(parameters)
+    columns = np.zeros((2 * len(at), len(COMMON)))
+    for channel, current in enumerate((at.jx, at.jy)):
+        columns[:, channel] = -np.outer(current, k[:, channel]).ravel()
+        columns[:, 2 + channel] = -np.tile(k[:, channel], len(at))
+    columns[:, 4:7] = by_angles(observations, parameters).reshape(-1, 3)
+    columns[:, 7:10] = _by_base(observations, parameters)
+    north, up = earth_rate(observations.latitude)
+    columns[:, 10] = right_side(here, -up, north)
+    columns[:, 11] = -design[:, 6:] @ parameters[6:]
+    columns[:, 12] = -design @ common.temperature_coefficients
+    return columns
+
+
+def _by_base(observations: Observations, parameters: Array) -> Array:
+    at = observations
+
+    def turned(step: Array) -> Array:
+        orientation = case_orientation(at.theta, at.psi, at.alpha, at.beta, at.gamma, base(*step))
+        return _residuals(elements(orientation), observations, parameters)
+
+    return np.stack([_central(turned, np.eye(3)[axis]) for axis in range(3)], axis=-1)
+
+
+def _central(function: Callable[[Array], Array], direction: Array) -> Array:
+    """Derivative by central differences: the sine's own step, so that a rotation's is exact to rounding."""
+    step = _STEP * direction
+    return (function(step) - function(-step)) / (2.0 * float(np.sin(_STEP)))
+
+
+def _residuals(here: Elements, observations: Observations, parameters: Array) -> Array:
+    design = design_matrix(here, observations.jx, observations.jy)
+    return np.asarray(right_side(here, *earth_rate(observations.latitude)) - design @ parameters)
+
+
+def _angles(observations: Observations, parameters: Array) -> tuple[Array, Array]:
+    """Columns for α, β, γ of each distinct position, and their standard uncertainties: repeats share them."""
+    at = observations
+    places = np.stack((at.theta, at.psi), axis=1)
+    _, first, place = np.unique(places, axis=0, return_index=True, return_inverse=True)
+    derivative = by_angles(observations, parameters)
+    columns = np.zeros((len(at), 2, len(first), 3))
+    columns[np.arange(len(at)), :, place.ravel(), :] = derivative
+    u = np.stack((at.u_alpha, at.u_beta, at.u_gamma), axis=1)[first]
+    return columns.reshape(2 * len(at), -1), u.ravel()
