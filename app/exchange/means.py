@@ -69,8 +69,9 @@ def _rows(table: Table, columns: dict[str, Column], problems: Problems) -> list[
     else:
         repeat = [] if problems else repeats(list(zip(theta, psi, strict=True)))
     problems.raise_if_any()
-    every = (theta, psi, jx, jy, u_jx, u_jy, duration, rate, started, temperature, repeat, table.lines)
-    return [MeansRow(*values) for values in zip(*every, strict=True)]
+    every = (theta, psi, jx, jy, u_jx, u_jy, duration, rate, started, temperature, repeat)
+    rows = zip(*every, strict=True)
+    return [replace(MeansRow(*values), line=line) for values, line in zip(rows, table.lines, strict=True)]
 
 
 def _check_positive(rows: Sequence[MeansRow], columns: dict[str, Column], problems: Problems) -> None:

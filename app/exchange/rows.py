@@ -26,6 +26,7 @@ class CertificateRow:
 class MeansRow:
     """Mean torquer currents of one measured position. `repeat` counts from 0.
 
+    `dof_jx` and `dof_jy` are the degrees of freedom of the uncertainties, None where they are not known.
     `line` is where the row stood in its file, for problems found later; it is no part of the value.
     """
 
@@ -40,6 +41,8 @@ class MeansRow:
     started_at: datetime | None = None
     temperature_c: float | None = None
     repeat: int = 0
+    dof_jx: float | None = None
+    dof_jy: float | None = None
     line: int | None = field(default=None, compare=False)
 
 

@@ -118,6 +118,12 @@ def _observations(
         u_jy=units.ampere_from_ma(u_jy) if uncertain else None,
         duration=_column([row.duration_s for row in means]),
         rate=_column([row.rate_hz for row in means]),
+        time=_times(means),
+        u_alpha=_uncertain_angle([row.u_alpha_arcsec for row in angles]),
+        u_beta=_uncertain_angle([row.u_beta_arcsec for row in angles]),
+        u_gamma=_uncertain_angle([row.u_gamma_arcsec for row in angles]),
+        dof_jx=_freedom([row.dof_jx for row in means]),
+        dof_jy=_freedom([row.dof_jy for row in means]),
         latitude=units.rad_from_deg(float(latitude_deg)),
     )
 
@@ -125,6 +131,29 @@ def _observations(
 def _column(values: Sequence[float | None]) -> NDArray[np.float64]:
     """Values as float64, NaN for None; −0 becomes 0, so that equal numbers have equal bits."""
     return np.array([np.nan if value is None else value for value in values], dtype=np.float64) + 0.0
+
+
+def _times(means: Sequence[MeansRow]) -> NDArray[np.float64]:
+    """Middle of each measurement, s since the first began; NaN where its beginning is not known."""
+    begun = [row.started_at for row in means if row.started_at is not None]
+    first = min(begun, default=None)
+    return np.array(
+        [
+            np.nan
+            if row.started_at is None or first is None
+            else (row.started_at - first).total_seconds() + (row.duration_s or 0.0) / 2
+            for row in means
+        ]
+    )
+
+
+def _uncertain_angle(values: Sequence[float | None]) -> NDArray[np.float64]:
+    """Standard uncertainties of certified angles, rad; what is not stated counts as none."""
+    return units.rad_from_arcsec(np.nan_to_num(_column(values)))
+
+
+def _freedom(values: Sequence[float | None]) -> NDArray[np.float64]:
+    return np.array([np.inf if value is None else value for value in values], dtype=np.float64)
 
 
 def incomplete_uncertainties(means: Sequence[MeansRow]) -> Message | None:

@@ -16,7 +16,7 @@ from app.pages.base import Reader, TheLab, render
 from app.pages.result_view import limit_text
 from app.pages.tables import Row, csv_answer, json_answer
 from app.services import gyros, history, session_index
-from app.services.views import COVERAGE_FACTOR, HistoryPoint, HistorySeries
+from app.services.views import HistoryPoint, HistorySeries
 
 router = APIRouter()
 
@@ -114,14 +114,19 @@ def _limits(item: HistorySeries) -> Iterator[plots.DriftLimit]:
 
 
 def _point(item: HistorySeries, point: HistoryPoint) -> plots.DriftPoint:
-    expanded = None if point.u is None else COVERAGE_FACTOR * point.u
     name = gettext("%(day)s, session %(session)d: %(value)s %(unit)s") % {
-        "day": day(point.measured_at), "session": point.session, "value": measured(point.value, expanded),
+        "day": day(point.measured_at), "session": point.session, "value": measured(point.value, point.expanded),
         "unit": labels.unit(item.unit),
     }  # fmt: skip
     state = _STATES.get(point.verdict, "within")
     return plots.DriftPoint(
-        point.measured_at, point.value or 0.0, expanded, state, name, "", f"/results/{point.calibration}"
+        point.measured_at,
+        point.value or 0.0,
+        point.expanded,
+        state,
+        name,
+        "",
+        f"/results/{point.calibration}",
     )
 
 
@@ -160,7 +165,7 @@ def _row(serial: str, series: HistorySeries, point: HistoryPoint) -> Row:
         "start": point.start, "stand": point.stand, "certificate": point.certificate,
         "result": point.calibration, "parameter": series.parameter, "value": point.value,
         "standard_uncertainty": point.u,
-        "expanded_uncertainty": None if point.u is None else COVERAGE_FACTOR * point.u,
-        "coverage_factor": COVERAGE_FACTOR, "unit": series.unit, "low": series.low, "high": series.high,
+        "expanded_uncertainty": point.expanded,
+        "coverage_factor": point.k, "unit": series.unit, "low": series.low, "high": series.high,
         "verdict": point.verdict,
     }  # fmt: skip

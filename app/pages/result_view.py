@@ -88,7 +88,7 @@ class ResultPage:
         if self.paper is not None and "parameters" in self.paper:
             found = self.paper["parameters"][view.name]
             value, u = found["value"], found["standard_uncertainty"]
-            expanded = None if u is None else COVERAGE_FACTOR * u
+            expanded = None if u is None else found.get("coverage_factor", COVERAGE_FACTOR) * u
             paper = measured(value, expanded)
             decimals = decimals_of(view.expanded)
             if value is not None and view.value is not None:

@@ -104,11 +104,11 @@ def _parameter_rows(view: CalibrationView, answer: Mapping[str, Any]) -> Iterato
     judging = "paper" if view.method == "paper" else "least-squares"
     for name, found in answer.get("parameters", {}).items():
         judged = view.summary.parameters[name]
-        u = found["standard_uncertainty"]
+        u, k = found["standard_uncertainty"], found.get("coverage_factor", COVERAGE_FACTOR)
         yield {
             "method": answer["method"], "parameter": name, "value": found["value"], "unit": found["unit"],
-            "standard_uncertainty": u, "expanded_uncertainty": None if u is None else COVERAGE_FACTOR * u,
-            "coverage_factor": COVERAGE_FACTOR, "low": judged.low, "high": judged.high,
+            "standard_uncertainty": u, "expanded_uncertainty": None if u is None or k is None else k * u,
+            "coverage_factor": k, "low": judged.low, "high": judged.high,
             "verdict": judged.verdict if answer["method"] == judging else None,
         }  # fmt: skip
 
@@ -163,7 +163,7 @@ def _rows(session: SessionView) -> list[Row]:
             "started_at": session.started_at.astimezone(UTC), "solved_at": result.solved_at.astimezone(UTC),
             "revision": result.revision, "method": result.method, "verdict": result.verdict,
             "parameter": view.name, "value": view.value, "standard_uncertainty": view.u,
-            "expanded_uncertainty": view.expanded, "coverage_factor": COVERAGE_FACTOR, "unit": view.unit,
+            "expanded_uncertainty": view.expanded, "coverage_factor": view.k, "unit": view.unit,
             "low": view.low, "high": view.high, "parameter_verdict": view.verdict,
         }
         for view in result.parameters.values()

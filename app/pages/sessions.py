@@ -16,7 +16,7 @@ from app.pages.tables import Row, csv_answer, json_answer
 from app.services import calibrations, gyros, session_index, sessions, stands
 from app.services.lab import Lab, Person, Work
 from app.services.sessions import NewSession
-from app.services.views import COVERAGE_FACTOR, MeasurementView, SessionDetail, SessionView
+from app.services.views import MeasurementView, SessionDetail, SessionView
 
 router = APIRouter()
 
@@ -182,7 +182,8 @@ def _line(session: SessionView) -> Row:
         "verdict": result.verdict if result else None,
         **{f"{name}_deg_per_h": view.value if view else None for name, view in known.items()},
         **{f"expanded_{name}_deg_per_h": view.expanded if view else None for name, view in known.items()},
-        "coverage_factor": COVERAGE_FACTOR, "note": session.note,
+        **{f"coverage_factor_{name}": view.k if view else None for name, view in known.items()},
+        "note": session.note,
     }  # fmt: skip
 
 

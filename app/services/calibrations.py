@@ -131,7 +131,7 @@ def means_row(row: Measurement) -> MeansRow:
         raise ValueError(f"measurement {row.id} is withdrawn")
     return MeansRow(
         row.theta_deg, row.psi_deg, row.jx_ma, row.jy_ma, row.u_jx_ma, row.u_jy_ma, row.duration_s,
-        row.rate_hz, row.measured_at, row.temperature_c, row.repeat,
+        row.rate_hz, row.measured_at, row.temperature_c, row.repeat, row.dof_jx, row.dof_jy,
     )  # fmt: skip
 
 

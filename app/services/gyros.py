@@ -7,9 +7,9 @@ from app.errors import Conflict, Invalid, NotFound, problem
 from app.services import verdicts
 from app.services.lab import Work
 from app.services.names import checked_name
-from app.services.views import GyroView, Page, TypeView
+from app.services.views import GyroView, Nominal, Page, TypeView
 from app.store import equipment, results
-from app.store.tables import Calibration, Gyro, GyroType, Start, TypeLimit
+from app.store.tables import Calibration, Gyro, GyroType, Start, TypeLimit, TypeNominal
 from solver.records import PARAMETERS
 
 
@@ -58,7 +58,13 @@ def gyros(
 def types(work: Work) -> tuple[TypeView, ...]:
     """Every type with its limits and the number of its gyros."""
     return tuple(
-        TypeView(kind.name, kind.note, count, {item.parameter: (item.low, item.high) for item in kind.limits})
+        TypeView(
+            kind.name,
+            kind.note,
+            count,
+            {item.parameter: (item.low, item.high) for item in kind.limits},
+            nominals_of(kind),
+        )
         for kind, count in equipment.types_with_counts(work.db)
     )
 
@@ -72,13 +78,50 @@ def set_limits(work: Work, type_name: str, limits: Mapping[str, tuple[float, flo
             raise Invalid(
                 problem("bad-limit", "The lower limit must be below the upper one.", column=parameter)
             )
-    name = checked_name(type_name, "type")
-    kind = equipment.gyro_type(work.db, name) or GyroType(name=name, note=note)
-    work.db.add(kind)
+    kind = _find_or_add_type(work, type_name, note)
     kind.limits.clear()
     work.db.flush()
     kind.limits.extend(TypeLimit(parameter=name, low=low, high=high) for name, (low, high) in limits.items())
     work.db.flush()
+
+
+def set_nominals(work: Work, type_name: str, nominals: Mapping[str, Nominal]) -> None:
+    """Enter what the type's parameters are expected to be; they replace those before.
+
+    Raises
+    ------
+    Invalid
+        An unknown parameter, or a standard uncertainty that is not positive.
+    """
+    for parameter, nominal in nominals.items():
+        if parameter not in PARAMETERS:
+            raise Invalid(problem("unknown-parameter", "There is no parameter “%(name)s”.", name=parameter))
+        if not nominal.u > 0:
+            raise Invalid(problem("bad-uncertainty", "The standard uncertainty of a nominal value must be "
+                                  "greater than zero.", column=parameter))  # fmt: skip
+    kind = _find_or_add_type(work, type_name)
+    kind.nominals.clear()
+    work.db.flush()
+    kind.nominals.extend(
+        TypeNominal(parameter=name, value=item.value, standard_uncertainty=item.u, per_kelvin=item.per_kelvin)
+        for name, item in nominals.items()
+    )
+    work.db.flush()
+
+
+def nominals_of(kind: GyroType) -> dict[str, Nominal]:
+    """What the type's parameters are expected to be, by name."""
+    return {
+        item.parameter: Nominal(item.value, item.standard_uncertainty, item.per_kelvin)
+        for item in kind.nominals
+    }
+
+
+def _find_or_add_type(work: Work, type_name: str, note: str = "") -> GyroType:
+    name = checked_name(type_name, "type")
+    kind = equipment.gyro_type(work.db, name) or GyroType(name=name, note=note)
+    work.db.add(kind)
+    return kind
 
 
 def add_start(work: Work, row: Gyro, powered_up_at: datetime, note: str = "") -> Start:

@@ -7,7 +7,7 @@ from app.errors import Invalid, problem
 from app.exchange.si import PARAMETER_UNITS
 from app.services.gyros import find_gyro
 from app.services.lab import Work
-from app.services.verdicts import judge
+from app.services.verdicts import coverage_factor, judge
 from app.services.views import HistoryPoint, HistorySeries
 from app.store import results
 from app.store.tables import Calibration, CalibrationParameter
@@ -52,6 +52,6 @@ def _point(
     return HistoryPoint(
         calibration=result.id, session=session.id, measured_at=session.started_at,
         start=session.start.number, stand=session.stand.name, certificate=session.certificate.number,
-        value=value.value, u=value.standard_uncertainty,
-        verdict=judge(value.value, value.standard_uncertainty, low, high),
+        value=value.value, u=value.standard_uncertainty, k=coverage_factor(value),
+        verdict=judge(value.value, value.standard_uncertainty, low, high, coverage_factor(value)),
     )  # fmt: skip

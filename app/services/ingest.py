@@ -100,8 +100,9 @@ def _content(item: Measured) -> dict[str, Any]:
     row = item.row
     return {
         "jx_ma": row.jx_ma, "jy_ma": row.jy_ma, "u_jx_ma": row.u_jx_ma, "u_jy_ma": row.u_jy_ma,
-        "duration_s": row.duration_s, "rate_hz": row.rate_hz, "measured_at": row.started_at,
-        "temperature_c": row.temperature_c, "source_digest": item.source.digest, "note": item.note,
+        "dof_jx": row.dof_jx, "dof_jy": row.dof_jy, "duration_s": row.duration_s, "rate_hz": row.rate_hz,
+        "measured_at": row.started_at, "temperature_c": row.temperature_c,
+        "source_digest": item.source.digest, "note": item.note,
         "record_digest": item.record.digest if item.record else None,
     }  # fmt: skip
 

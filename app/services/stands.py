@@ -11,9 +11,10 @@ from app.exchange.certificate import write_certificate_csv
 from app.exchange.fields import full_turn
 from app.exchange.positions import Positions
 from app.exchange.rows import CertificateRow
+from app.exchange.uncertainties import Statement, common_uncertainty
 from app.services.lab import Work
 from app.services.names import checked_name
-from app.services.views import CertificateView, StandView
+from app.services.views import NONE_IN_COMMON, CertificateView, CommonAngles, StandView
 from app.store import equipment
 from app.store.tables import CertificatePosition, Stand, StandCertificate
 
@@ -44,6 +45,23 @@ def stands(work: Work) -> tuple[StandView, ...]:
     return tuple(_stand_view(work, row) for row in equipment.stands(work.db))
 
 
+def state_uncertainty(work: Work, name: str, statement: Statement) -> StandView:
+    """Enter what all positions measured on a stand have in common; it replaces what was stated before.
+
+    Results that are there already keep the statement that they were computed with.
+
+    Raises
+    ------
+    Invalid
+        As `app.exchange.uncertainties.common_uncertainty`.
+    """
+    common_uncertainty(statement)
+    row = find_stand(work, name)
+    row.uncertainty = dict(statement) or None
+    work.db.flush()
+    return _stand_view(work, row)
+
+
 def add_certificate(
     work: Work,
     stand_name: str,
@@ -52,8 +70,11 @@ def add_certificate(
     valid_until: date,
     rows: Sequence[CertificateRow],
     issued_by: str = "",
+    common: CommonAngles = NONE_IN_COMMON,
 ) -> CertificateView:
     """Keep a new version of a stand's certificate; it never changes afterwards.
+
+    `common` are the standard uncertainties of what the angles of all positions share.
 
     Raises
     ------
@@ -79,7 +100,7 @@ def add_certificate(
     certificate = StandCertificate(
         stand=row, number=number, version=version, valid_from=valid_from, valid_until=valid_until,
         issued_by=issued_by, digest=hashlib.sha256(write_certificate_csv(ordered)).hexdigest(),
-        created_at=work.now, created_by=work.person.name,
+        created_at=work.now, created_by=work.person.name, **common._asdict(),
         positions=[CertificatePosition(**_columns(item)) for item in ordered],
     )  # fmt: skip
     work.db.add(certificate)
@@ -144,12 +165,23 @@ def certificate_rows(row: StandCertificate) -> tuple[CertificateRow, ...]:
     )  # fmt: skip
 
 
+def statement(row: StandCertificate) -> Statement:
+    """What all positions measured with this certificate have in common: the stand's part and its own."""
+    own = {name: value for name, value in _common(row)._asdict().items() if value}
+    return {**(row.stand.uncertainty or {}), **own}
+
+
+def _common(row: StandCertificate) -> CommonAngles:
+    return CommonAngles(row.u_alpha_common_arcsec, row.u_beta_common_arcsec, row.u_gamma_common_arcsec)
+
+
 def certificate_view(row: StandCertificate, today: date) -> CertificateView:
     """A certificate as it is shown."""
     return CertificateView(
         stand=row.stand.name, number=row.number, version=row.version, valid_from=row.valid_from,
         valid_until=row.valid_until, issued_by=row.issued_by, digest=row.digest, created_at=row.created_at,
         created_by=row.created_by, valid=row.valid_from <= today <= row.valid_until,
+        common=_common(row),
         positions=certificate_rows(row),
     )  # fmt: skip
 
@@ -158,7 +190,7 @@ def _stand_view(work: Work, row: Stand) -> StandView:
     valid = equipment.valid_certificate(work.db, row.id, work.now.date())
     return StandView(
         row.name, row.latitude_deg, row.note, row.created_at,
-        certificate_view(valid, work.now.date()) if valid else None,
+        certificate_view(valid, work.now.date()) if valid else None, row.uncertainty or {},
     )  # fmt: skip
 
 

@@ -8,12 +8,19 @@ from collections.abc import Iterable, Mapping
 
 from app.exchange.si import PARAMETER_UNITS
 from app.services.views import COVERAGE_FACTOR, ParameterView, ResultSummary, Verdict
-from app.store.tables import Calibration
+from app.store.tables import Calibration, CalibrationParameter
 
 _WORST_FIRST: tuple[Verdict, ...] = ("fails", "undetermined", "conditional", "no-limit", "conforms")
 
 
-def judge(value: float | None, u: float | None, low: float | None, high: float | None) -> Verdict:
+def coverage_factor(row: CalibrationParameter) -> float:
+    """K of a stored parameter; a result of solver 1.0.0 has none of its own."""
+    return row.coverage_factor or COVERAGE_FACTOR
+
+
+def judge(
+    value: float | None, u: float | None, low: float | None, high: float | None, k: float = COVERAGE_FACTOR
+) -> Verdict:
     """Judge one value against its limits.
 
     Without an uncertainty a value inside its limits is conditional: nobody knows how far inside.
@@ -24,7 +31,7 @@ def judge(value: float | None, u: float | None, low: float | None, high: float |
         return "no-limit"
     if not low <= value <= high:
         return "fails"
-    guard = COVERAGE_FACTOR * u if u is not None else float("inf")
+    guard = k * u if u is not None else float("inf")
     return "conforms" if low + guard <= value <= high - guard else "conditional"
 
 
@@ -72,13 +79,15 @@ def parameter_views(
         if row.method != method:
             continue
         low, high = limits.get(row.parameter, (None, None))
+        k = coverage_factor(row)
         views[row.parameter] = ParameterView(
             name=row.parameter,
             value=row.value,
             u=row.standard_uncertainty,
+            k=k,
             unit=PARAMETER_UNITS[row.parameter][0],
             low=low,
             high=high,
-            verdict=judge(row.value, row.standard_uncertainty, low, high),
+            verdict=judge(row.value, row.standard_uncertainty, low, high, k),
         )
     return views

@@ -3,14 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import date, datetime
-from typing import Any, Generic, Literal, TypeVar
+from typing import Any, Generic, Literal, NamedTuple, TypeVar
 
 from app.exchange.rows import CertificateRow
 
 T = TypeVar("T")
 
 COVERAGE_FACTOR = 2.0
-"""k of every expanded uncertainty shown, about 95 %."""
+"""k of what has no budget of its own: a measured current, a result of solver 1.0.0; about 95 %."""
 
 Verdict = Literal["conforms", "conditional", "fails", "no-limit", "undetermined"]
 SessionState = Literal["measuring", "ready", "solving", "solved", "failed"]
@@ -24,19 +24,32 @@ class Page(Generic[T]):
     next: str | None
 
 
+class Nominal(NamedTuple):
+    """What a parameter of a type is expected to be, in its laboratory unit.
+
+    `u` is the standard deviation between gyros; `per_kelvin` its temperature coefficient, None when
+    it is not known.
+    """
+
+    value: float
+    u: float
+    per_kelvin: float | None = None
+
+
 @dataclass(frozen=True, slots=True)
 class TypeView:
-    """A type of gyro; `limits` maps a parameter to (low, high)."""
+    """A type of gyro; `limits` maps a parameter to (low, high), `nominals` to what is expected of it."""
 
     name: str
     note: str
     gyros: int
     limits: Mapping[str, tuple[float, float]]
+    nominals: Mapping[str, Nominal]
 
 
 @dataclass(frozen=True, slots=True)
 class ParameterView:
-    """One parameter of one result: value, u and U = k·u, limits of the type, verdict.
+    """One parameter of one result: value, u, k and U = k·u, limits of the type, verdict.
 
     `value` is None when the data do not determine it, `u` when no uncertainty can be given.
     """
@@ -44,6 +57,7 @@ class ParameterView:
     name: str
     value: float | None
     u: float | None
+    k: float
     unit: str
     low: float | None
     high: float | None
@@ -52,7 +66,7 @@ class ParameterView:
     @property
     def expanded(self) -> float | None:
         """U = k·u."""
-        return None if self.u is None else COVERAGE_FACTOR * self.u
+        return None if self.u is None else self.k * self.u
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +96,17 @@ class GyroView:
     last_result: ResultSummary | None
 
 
+class CommonAngles(NamedTuple):
+    """Standard uncertainties of what the certified angles of all positions share, arcsec; None: not stated."""
+
+    u_alpha_common_arcsec: float | None = None
+    u_beta_common_arcsec: float | None = None
+    u_gamma_common_arcsec: float | None = None
+
+
+NONE_IN_COMMON = CommonAngles()
+
+
 @dataclass(frozen=True, slots=True)
 class CertificateView:
     """One version of a stand's certificate. `valid` says whether it is valid today."""
@@ -96,18 +121,20 @@ class CertificateView:
     created_at: datetime
     created_by: str
     valid: bool
+    common: CommonAngles
     positions: tuple[CertificateRow, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class StandView:
-    """A stand and the certificate that is valid today."""
+    """A stand, the certificate that is valid today, and what is stated of its uncertainty."""
 
     name: str
     latitude_deg: float
     note: str
     created_at: datetime
     certificate: CertificateView | None
+    uncertainty: Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,7 +281,13 @@ class HistoryPoint:
     certificate: str
     value: float | None
     u: float | None
+    k: float
     verdict: Verdict
+
+    @property
+    def expanded(self) -> float | None:
+        """U = k·u."""
+        return None if self.u is None else self.k * self.u
 
 
 @dataclass(frozen=True, slots=True)

@@ -77,6 +77,8 @@ class NewMeans(Incoming):
     jy_ma: Number
     u_jx_ma: Positive | None = None
     u_jy_ma: Positive | None = None
+    dof_jx: Positive | None = None
+    dof_jy: Positive | None = None
     duration_s: Positive | None = None
     rate_hz: Positive | None = None
     started_at: Moment | None = None

@@ -12,10 +12,11 @@ METHODS = Literal["least-squares", "paper", "both"]
 
 
 class Parameter(Outgoing):
-    """One parameter: value, standard uncertainty u, expanded uncertainty U = 2·u, limits, verdict."""
+    """One parameter: value, standard uncertainty u, expanded uncertainty U = k·u, limits, verdict."""
 
     value: float | None
     standard_uncertainty: float | None = Field(validation_alias="u")
+    coverage_factor: float = Field(validation_alias="k")
     expanded_uncertainty: float | None = Field(validation_alias="expanded")
     unit: str
     low: float | None
@@ -91,6 +92,8 @@ class HistoryPoint(Outgoing):
     certificate: str
     value: float | None
     standard_uncertainty: float | None = Field(validation_alias="u")
+    coverage_factor: float = Field(validation_alias="k")
+    expanded_uncertainty: float | None = Field(validation_alias="expanded")
     verdict: Verdict
 
 

@@ -9,6 +9,7 @@ from app.store.tables.equipment import (
     StandCertificate,
     Start,
     TypeLimit,
+    TypeNominal,
 )
 from app.store.tables.measurement import Measurement, MeasuringSession, Record
 from app.store.tables.people import Account, Login, SignInLink, Token
@@ -34,4 +35,5 @@ __all__ = [
     "Start",
     "Token",
     "TypeLimit",
+    "TypeNominal",
 ]

@@ -1,6 +1,7 @@
 """Gyros and their types, stands and their certificates."""
 
 from datetime import date, datetime
+from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Mapped, mapped_column, relationship
@@ -18,6 +19,7 @@ class GyroType(Base):
     note: Mapped[str] = mapped_column(default="")
 
     limits: Mapped[list["TypeLimit"]] = relationship(lazy="selectin", cascade="all, delete-orphan")
+    nominals: Mapped[list["TypeNominal"]] = relationship(lazy="selectin", cascade="all, delete-orphan")
 
 
 class TypeLimit(Base):
@@ -29,6 +31,21 @@ class TypeLimit(Base):
     parameter: Mapped[str] = mapped_column(primary_key=True)
     low: Mapped[float]
     high: Mapped[float]
+
+
+class TypeNominal(Base):
+    """What a parameter of the type is expected to be, with its scatter between gyros; laboratory units.
+
+    `per_kelvin` is its temperature coefficient, None where it is not known.
+    """
+
+    __tablename__ = "type_nominal"
+
+    type_id: Mapped[int] = mapped_column(sa.ForeignKey("gyro_type.id"), primary_key=True)
+    parameter: Mapped[str] = mapped_column(primary_key=True)
+    value: Mapped[float]
+    standard_uncertainty: Mapped[float]
+    per_kelvin: Mapped[float | None]
 
 
 class Gyro(Base):
@@ -59,7 +76,10 @@ class Start(Base):
 
 
 class Stand(Base):
-    """A two-axis stand in its place."""
+    """A two-axis stand in its place.
+
+    `uncertainty` states what all positions measured here have in common (`app.exchange.uncertainties`).
+    """
 
     __tablename__ = "stand"
 
@@ -68,10 +88,15 @@ class Stand(Base):
     latitude_deg: Mapped[float]
     note: Mapped[str] = mapped_column(default="")
     created_at: Mapped[datetime]
+    uncertainty: Mapped[dict[str, Any] | None]
 
 
 class StandCertificate(Base):
-    """One version of a stand's certificate. It never changes; a new one has the next version."""
+    """One version of a stand's certificate. It never changes; a new one has the next version.
+
+    `u_alpha_common_arcsec` and its like are standard uncertainties of what every position's angle
+    shares; those of the positions are independent.
+    """
 
     __tablename__ = "stand_certificate"
     __table_args__ = (sa.UniqueConstraint("stand_id", "number"), sa.UniqueConstraint("stand_id", "version"))
@@ -83,6 +108,9 @@ class StandCertificate(Base):
     valid_from: Mapped[date]
     valid_until: Mapped[date]
     issued_by: Mapped[str] = mapped_column(default="")
+    u_alpha_common_arcsec: Mapped[float | None]
+    u_beta_common_arcsec: Mapped[float | None]
+    u_gamma_common_arcsec: Mapped[float | None]
     digest: Mapped[str]
     created_at: Mapped[datetime]
     created_by: Mapped[str]

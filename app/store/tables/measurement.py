@@ -75,6 +75,8 @@ class Measurement(Base):
     jy_ma: Mapped[float | None]
     u_jx_ma: Mapped[float | None]
     u_jy_ma: Mapped[float | None]
+    dof_jx: Mapped[float | None]
+    dof_jy: Mapped[float | None]
     duration_s: Mapped[float | None]
     rate_hz: Mapped[float | None]
     measured_at: Mapped[datetime | None]

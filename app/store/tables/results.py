@@ -65,7 +65,11 @@ class Calibration(Base):
 
 
 class CalibrationParameter(Base):
-    """A parameter of a result, laid out for the drift history; laboratory units."""
+    """A parameter of a result, laid out for the drift history; laboratory units.
+
+    `coverage_factor` is k of its expanded uncertainty; results of solver 1.0.0 had none of their own
+    and are shown with k = 2.
+    """
 
     __tablename__ = "calibration_parameter"
     __table_args__ = (sa.UniqueConstraint("calibration_id", "method", "parameter"),)
@@ -76,6 +80,7 @@ class CalibrationParameter(Base):
     parameter: Mapped[str]
     value: Mapped[float | None]
     standard_uncertainty: Mapped[float | None]
+    coverage_factor: Mapped[float | None]
 
 
 class IdempotentReply(Base):
