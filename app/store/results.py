@@ -115,6 +115,24 @@ def newest_of_gyros(db: Session, gyro_ids: Sequence[int]) -> Mapping[int, Calibr
     return {row.session.gyro_id: row for row in rows}
 
 
+def earlier_calibrations(
+    db: Session, gyro_id: int, before: datetime, limit: int = 5
+) -> Sequence[Calibration]:
+    """Newest results of the gyro's sessions that began before a time, the latest session first."""
+    newest = sa.select(sa.func.max(Calibration.id)).group_by(Calibration.session_id)
+    return db.scalars(
+        sa.select(Calibration)
+        .join(MeasuringSession, MeasuringSession.id == Calibration.session_id)
+        .where(
+            Calibration.id.in_(newest),
+            MeasuringSession.gyro_id == gyro_id,
+            MeasuringSession.started_at < before,
+        )
+        .order_by(MeasuringSession.started_at.desc())
+        .limit(limit)
+    ).all()
+
+
 def series(
     db: Session,
     gyro_id: int,
