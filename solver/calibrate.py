@@ -1,31 +1,79 @@
-"""The façade: observations in, each method's estimate out.
+"""The façade: observations in, each method's estimate out, with what limits it and what is odd about it.
 
-It checks the input once; everything below trusts it. The same observations give the same bits.
+`calibrate` solves, `Calibration.budget` says where the uncertainty comes from. It checks the input
+once; everything below trusts it. The same observations give the same bits.
 """
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver import __version__
-from solver.error_model import observation_equations
+from solver.budget import Budget, make_budget
+from solver.conclusion import Solved
+from solver.error_model import Equations, observation_equations
 from solver.errors import InputError, Message, NotConverged, SolverError
-from solver.estimation import least_squares_estimate, paper_estimate
-from solver.records import Calibration, Estimate, Failure, Observations
-from solver.units import deg_from_rad
+from solver.estimation import least_squares, paper
+from solver.inputs import CommonUncertainty
+from solver.measurement_rule import about_fit, about_measurement
+from solver.records import Estimate, Failure, Method, Observations
 
-LEAST_DURATION: Final = 60.0
-"""Shortest measurement of a position by the method, s."""
-LEAST_RATE: Final = 200.0
-"""Slowest sampling by the method, Hz."""
-RULE_TOLERANCE: Final = 1e-3
-"""Relative tolerance on both."""
-_MOST_NAMED: Final = 8
+METHODS: Final[tuple[Method, ...]] = ("least-squares", "paper")
+Asked = Literal["least-squares", "paper", "both"]
+
+_Solver = Callable[[Equations, Observations, CommonUncertainty | None], Solved]
+_SOLVERS: Final[Mapping[Method, _Solver]] = {"least-squares": least_squares, "paper": paper}
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """Each asked method's answer or failure.
+
+    Attributes
+    ----------
+    input_hash, solver_version
+        Of what went in, and of what solved it.
+    observations
+        As they went in.
+    common
+        What was stated of the uncertainty that all positions share.
+    answers
+        Estimate or failure, by method.
+    solved
+        What each estimate came from, by method.
+    """
+
+    input_hash: str
+    solver_version: str
+    observations: Observations
+    common: CommonUncertainty | None
+    answers: Mapping[Method, Estimate | Failure]
+    solved: Mapping[Method, Solved] = field(default_factory=dict)
+
+    @property
+    def least_squares(self) -> Estimate | None:
+        """The estimate by least squares; None when it was not asked."""
+        found = self.answers.get("least-squares")
+        return found if isinstance(found, Estimate) else None
+
+    @property
+    def paper(self) -> Estimate | Failure | None:
+        """The paper's estimate, or why there is none; None when it was not asked."""
+        return self.answers.get("paper")
+
+    def budget(self, method: Method) -> Budget | None:
+        """Where a method's uncertainty comes from; None where nobody knows it."""
+        solved = self.solved.get(method)
+        if solved is None or solved.estimate.uncertainty_basis == "none":
+            return None
+        at = solved.linearise()
+        return make_budget(at.gain, at.inputs, scatter=at.scatter, scatter_dof=at.scatter_dof)
 
 
 def calibrate(
-    observations: Observations, method: Literal["least-squares", "paper", "both"] = "both"
+    observations: Observations, method: Asked = "both", common: CommonUncertainty | None = None
 ) -> Calibration:
     """Find the eight parameters.
 
@@ -34,44 +82,47 @@ def calibrate(
     observations
         From `Observations.sorted_from`.
     method
-        ``both`` gives the two estimates side by side.
+        ``both`` gives least squares and the paper's method side by side.
+    common
+        Uncertainty of what all positions share.
 
     Returns
     -------
     Calibration
-        With ``both``, a failure of the paper's method is a `Failure` in `Calibration.paper`.
+        With ``both``, a failure of the paper's method is a `Failure` among the answers.
 
     Raises
     ------
     InputError
         When there are no positions, rows are not sorted, or (``paper`` alone) a position is missing.
     NotConverged
-        With ``paper`` alone, when the iteration does not end.
+        When the one method asked for does not converge.
     """
     _check(observations, method)
     equations = observation_equations(observations)
-    least_squares: Estimate | None = None
-    paper: Estimate | Failure | None = None
-    if method != "paper":
-        least_squares = _complete(least_squares_estimate(equations), observations)
-    if method != "least-squares":
+    asked: tuple[Method, ...] = ("least-squares", "paper") if method == "both" else (method,)
+    answers: dict[Method, Estimate | Failure] = {}
+    solved: dict[Method, Solved] = {}
+    for one in asked:
         try:
-            paper = _complete(paper_estimate(equations, observations), observations)
+            solved[one] = _complete(_SOLVERS[one](equations, observations, common), observations)
+            answers[one] = solved[one].estimate
         except SolverError as error:
-            if method == "paper":
+            if len(asked) == 1:
                 raise
             iterations = error.iterations if isinstance(error, NotConverged) else None
-            paper = Failure("paper", error.message, iterations)
-    return Calibration(observations.input_hash(), __version__, observations, least_squares, paper)
+            answers[one] = Failure(one, error.message, iterations)
+    return Calibration(observations.input_hash(), __version__, observations, common, answers, solved)
 
 
 def _check(observations: Observations, method: str) -> None:
-    if method not in ("least-squares", "paper", "both"):
+    known = (*METHODS, "both")
+    if method not in known:
         raise InputError(
             Message(
                 "bad-method",
-                "The method must be least-squares, paper or both, not %(method)s.",
-                {"method": method},
+                "There is no method “%(method)s”. Choose one of %(methods)s.",
+                {"method": method, "methods": ", ".join(known)},
             )
         )
     if len(observations) == 0:
@@ -89,98 +140,8 @@ def _check(observations: Observations, method: str) -> None:
         )
 
 
-def _complete(estimate: Estimate, observations: Observations) -> Estimate:
-    """Add the warnings that both methods share."""
-    warnings = (*estimate.warnings, *_about_measurement(observations), *_about_fit(estimate, observations))
-    return Estimate(
-        **{name: getattr(estimate, name) for name in Estimate.__dataclass_fields__ if name != "warnings"},
-        warnings=warnings,
-    )
-
-
-def _about_measurement(observations: Observations) -> list[Message]:
-    warnings = []
-    duration, rate = observations.duration, observations.rate
-    unknown = np.isnan(duration) | np.isnan(rate)
-    if unknown.all():
-        warnings.append(
-            Message(
-                "duration-unknown",
-                "Duration or sampling rate is not given for any position, so the measurement rule (60 s at "
-                "200 Hz) cannot be checked.",
-            )
-        )
-    elif unknown.any():
-        warnings.append(
-            Message(
-                "duration-unknown",
-                "Duration or sampling rate is not given, so the measurement rule (60 s at 200 Hz) cannot be "
-                "checked: %(positions)s.",
-                {"positions": _named(unknown, observations)},
-            )
-        )
-    least = 1.0 - RULE_TOLERANCE
-    below = (duration < LEAST_DURATION * least) | (rate < LEAST_RATE * least)
-    if below.all():
-        warnings.append(
-            Message(
-                "below-method",
-                "Every position was measured for less than 60 s or at less than 200 Hz: below the method.",
-            )
-        )
-    elif below.any():
-        warnings.append(
-            Message(
-                "below-method",
-                "Measured for less than 60 s or at less than 200 Hz, below the method: %(positions)s.",
-                {"positions": _named(below, observations)},
-            )
-        )
-    return warnings
-
-
-def _about_fit(estimate: Estimate, observations: Observations) -> list[Message]:
-    warnings = []
-    untold = observations.u_jx is None or observations.u_jy is None
-    if untold and estimate.uncertainty_basis == "scatter":
-        warnings.append(
-            Message(
-                "no-uncertainty",
-                "No uncertainty of the currents is given: the parameters' uncertainty is taken from the "
-                "scatter of the residuals, and the fit cannot be tested.",
-            )
-        )
-    if untold and estimate.uncertainty_basis == "none":
-        warnings.append(
-            Message(
-                "no-uncertainty",
-                "No uncertainty of the currents is given and no residual is left to take it from: the "
-                "parameters have no uncertainty. Give u(J) or measure more positions.",
-            )
-        )
-    if estimate.outliers.any():
-        places = [
-            f"{axis} ({_named(estimate.outliers[:, index], observations)})"
-            for index, axis in enumerate("xy")
-            if estimate.outliers[:, index].any()
-        ]
-        warnings.append(
-            Message(
-                "outlier",
-                "Residuals too large for their noise (test at 1 %% over all residuals): %(places)s. Check "
-                "these positions and measure them again.",
-                {"places": "; ".join(places)},
-            )
-        )
-    return warnings
-
-
-def _named(marked: NDArray[np.bool_], observations: Observations) -> str:
-    """Name the marked positions in no language: ``θ 0° ψ 90°, θ 90° ψ 0° ·2`` (its first repeat), ``… (+3)``."""
-    places = []
-    for row in np.flatnonzero(marked)[:_MOST_NAMED]:
-        theta, psi = (deg_from_rad(float(angle[row])) for angle in (observations.theta, observations.psi))
-        repeat = int(observations.repeat[row])
-        places.append(f"θ {theta:.6g}° ψ {psi:.6g}°" + (f" ·{repeat + 1}" if repeat else ""))
-    more = int(marked.sum()) - len(places)
-    return ", ".join(places) + (f", … (+{more})" if more else "")
+def _complete(solved: Solved, observations: Observations) -> Solved:
+    """Add the warnings that all methods share."""
+    estimate = solved.estimate
+    warnings = (*estimate.warnings, *about_measurement(observations), *about_fit(estimate, observations))
+    return replace(solved, estimate=replace(estimate, warnings=warnings))

@@ -254,14 +254,3 @@ class Failure:
     method: Method
     message: Message
     iterations: Array | None
-
-
-@dataclass(frozen=True, slots=True)
-class Calibration:
-    """The answer of `solver.calibrate.calibrate`: each asked method's estimate or failure."""
-
-    input_hash: str
-    solver_version: str
-    observations: Observations
-    least_squares: Estimate | None
-    paper: Estimate | Failure | None

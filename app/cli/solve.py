@@ -14,7 +14,7 @@ from app.cli.sessions_on_disk import Item, items
 from app.cli.tables import print_result
 from app.errors import AppError, Invalid, Problem, problem
 from app.exchange.certificate import read_certificate
-from app.exchange.result import dumps, message_json
+from app.exchange.json_values import dumps, message_json
 from app.exchange.rows import CertificateRow
 from app.exchange.session_folder import SessionFiles
 from app.exchange.si import incomplete_uncertainties

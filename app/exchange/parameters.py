@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from app.exchange.json_text import Reader, load_object
+from app.exchange.json_values import dumps
 from app.exchange.problems import Problems
-from app.exchange.result import dumps, parameters_json
+from app.exchange.result import parameters_json
 from app.exchange.si import PARAMETER_UNITS, parameter_lab, parameter_si
 from solver.errors import Message
 from solver.records import PARAMETERS

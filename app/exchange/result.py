@@ -1,19 +1,18 @@
 """A calibration as JSON in laboratory units: what the API, the command and the pages give out."""
 
-import json
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
+from app.exchange.json_values import Json, finite, message_json
 from app.exchange.si import PARAMETER_UNITS, covariance_lab, parameter_lab
 from solver import units
-from solver.errors import Message
-from solver.records import PARAMETERS, Array, Calibration, Estimate, Failure, Fit, Observations
+from solver.calibrate import Calibration
+from solver.records import PARAMETERS, Array, Estimate, Failure, Fit, Observations
 
 ResultMethod = Literal["least-squares", "paper", "both"]
-Json = dict[str, Any]
 
 
 def calibration_json(calibration: Calibration, method: ResultMethod) -> Json:
@@ -45,7 +44,7 @@ def calibration_json(calibration: Calibration, method: ResultMethod) -> Json:
 
 
 def _one(calibration: Calibration, method: Literal["least-squares", "paper"]) -> Json:
-    answer = calibration.paper if method == "paper" else calibration.least_squares
+    answer = calibration.answers.get(method)
     if answer is None:
         raise ValueError(f"this calibration has no answer of the method {method}")
     head = {
@@ -140,40 +139,3 @@ def _iterations(rounds: Array | None) -> list[Json]:
         {name: finite(parameter_lab(name, float(value))) for name, value in zip(PARAMETERS, row, strict=True)}
         for row in np.asarray(rounds)
     ]
-
-
-def message_json(message: Message) -> Json:
-    """Write a message: its code and sentence, and what another language needs to say it."""
-    plain: Json = {"code": message.code, "message": message.text}
-    if message.values:
-        plain |= {"template": message.template, "values": _plain(message.values)}
-    return plain
-
-
-def message_from(stored: Mapping[str, Any]) -> Message:
-    """Read back what `message_json` wrote."""
-    template = stored.get("template") or stored["message"]
-    return Message(stored["code"], template, stored.get("values") or {})
-
-
-def _plain(value: Any) -> Any:
-    """Turn a message's values into what JSON knows."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float):
-        return finite(value)
-    return value if isinstance(value, str | int | bool | None) else str(value)
-
-
-def finite(value: float | None) -> float | None:
-    """The number, or None when it is unknown or not finite: JSON has no NaN."""
-    return None if value is None or not math.isfinite(value) else float(value)
-
-
-def dumps(content: Any, *, indent: int | None = None) -> str:
-    """Write JSON, equal content to equal bytes: keys in their given order, no NaN, letters as they are."""
-    return json.dumps(content, ensure_ascii=False, allow_nan=False, indent=indent)

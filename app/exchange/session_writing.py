@@ -5,11 +5,11 @@ from datetime import datetime
 from typing import Any, Final, Literal
 
 from app.exchange.certificate import write_certificate_csv
+from app.exchange.json_values import dumps
 from app.exchange.means import write_means_csv
 from app.exchange.parameters import write_truth
 from app.exchange.record_files import write_record_csv, write_record_parquet
 from app.exchange.record_places import record_name
-from app.exchange.result import dumps
 from app.exchange.rows import CertificateRow, CurrentRecord, Facts, MeansRow
 from app.exchange.session_folder import TRUTH
 from app.exchange.session_json import FILE_NAME

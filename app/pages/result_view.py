@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from app.exchange.result import message_from
+from app.exchange.json_values import message_from
 from app.figures import DASH, Figure, Measured, decimals_of, figure, measured, plain, significant, superscript
 from app.i18n import gettext, translate
 from app.pages import labels

@@ -11,7 +11,8 @@ from typing import Any
 
 from app.errors import Invalid, problem
 from app.exchange.items import read_item
-from app.exchange.result import ResultMethod, calibration_json, dumps, parameters_json
+from app.exchange.json_values import dumps
+from app.exchange.result import ResultMethod, calibration_json, parameters_json
 from app.exchange.rows import CertificateRow, CurrentRecord, MeansRow
 from app.exchange.si import observations
 from app.services.keeping import keep_record

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, Final
 
-from app.exchange.result import message_json
+from app.exchange.json_values import message_json
 from app.services.gyros import nominals_of
 from app.services.lab import Work
 from app.services.verdicts import main_method

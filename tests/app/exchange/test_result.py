@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.exchange.result import calibration_json, dumps, message_from, message_json
+from app.exchange.json_values import dumps, message_from, message_json
+from app.exchange.result import calibration_json
 from app.exchange.rows import CertificateRow, MeansRow
 from app.exchange.si import observations
+from solver.calibrate import Calibration
 from solver.errors import Message
-from solver.records import PARAMETERS, Calibration, Estimate, Failure, Fit, Method, Observations
+from solver.records import PARAMETERS, Estimate, Failure, Fit, Method, Observations
 
 DEG = math.pi / 180
 SCALE = DEG / 3600 * 1000  # 1 °/h/mA in rad/(s·A), from the definitions
@@ -57,8 +59,8 @@ def _calibration(
         input_hash="sha256:00",
         solver_version="1.0.0",
         observations=_observations(),
-        least_squares=least_squares or _estimate(),
-        paper=paper or _estimate("paper"),
+        common=None,
+        answers={"least-squares": least_squares or _estimate(), "paper": paper or _estimate("paper")},
     )
 
 
@@ -107,7 +109,7 @@ def test_every_stand_angle_of_a_tenth_of_a_degree_comes_back_as_written() -> Non
         standardised=np.zeros((n, 2)),
         outliers=np.zeros((n, 2), dtype=np.bool_),
     )
-    calibration = replace(_calibration(), observations=inputs, least_squares=blank)
+    calibration = replace(_calibration(blank), observations=inputs)
     rows = calibration_json(calibration, "least-squares")["residuals"]
     assert [row["theta_deg"] for row in rows] == [i / 10 for i in range(3600)]
 
@@ -170,7 +172,7 @@ def test_a_method_that_failed_says_why_with_its_history_and_the_other_stands() -
 
 def test_a_method_that_was_not_asked_for_cannot_be_written() -> None:
     with pytest.raises(ValueError, match="no answer of the method paper"):
-        calibration_json(replace(_calibration(), paper=None), "paper")
+        calibration_json(replace(_calibration(), answers={}), "paper")
 
 
 def test_a_message_comes_back_from_json_whole() -> None:
