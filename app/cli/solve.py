@@ -18,7 +18,7 @@ from app.exchange.json_values import dumps, message_json
 from app.exchange.rows import CertificateRow
 from app.exchange.session_folder import SessionFiles
 from app.exchange.si import incomplete_uncertainties
-from app.services.computing import solved
+from app.services.solving import solved
 from solver.errors import Message
 
 

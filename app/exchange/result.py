@@ -7,8 +7,10 @@ from typing import Literal
 import numpy as np
 
 from app.exchange.json_values import Json, finite, message_json
+from app.exchange.limits import budget_json, expanded_json, in_lab
 from app.exchange.si import PARAMETER_UNITS, covariance_lab, parameter_lab
 from solver import units
+from solver.budget import Budget
 from solver.calibrate import Calibration
 from solver.records import PARAMETERS, Array, Estimate, Failure, Fit, Observations
 
@@ -54,17 +56,20 @@ def _one(calibration: Calibration, method: Literal["least-squares", "paper"]) ->
     }
     if isinstance(answer, Failure):
         return {**head, "error": message_json(answer.message), "iterations": _iterations(answer.iterations)}
-    return {**head, **_estimate(answer, calibration.observations)}
+    return {**head, **_estimate(answer, calibration.observations, calibration.budget(method))}
 
 
-def _estimate(estimate: Estimate, observations: Observations) -> Json:
+def _estimate(estimate: Estimate, observations: Observations, budget: Budget | None) -> Json:
+    parameters = parameters_json(estimate.values, estimate.standard_uncertainties)
+    expanded = expanded_json(budget)
     return {
-        "parameters": parameters_json(estimate.values, estimate.standard_uncertainties),
+        "parameters": {name: {**entry, **expanded[name]} for name, entry in parameters.items()},
         "covariance": [[finite(cell) for cell in row] for row in covariance_lab(estimate.covariance)],
         "uncertainty_basis": estimate.uncertainty_basis,
         "residuals": _residuals(estimate, observations),
         "fit": _fit(estimate.fit),
         "iterations": _iterations(estimate.iterations),
+        "budget": budget_json(budget),
         "warnings": [message_json(warning) for warning in estimate.warnings],
     }
 
@@ -135,7 +140,4 @@ def _iterations(rounds: Array | None) -> list[Json]:
     """The paper's approximations, one object per round; none for least squares."""
     if rounds is None:
         return []
-    return [
-        {name: finite(parameter_lab(name, float(value))) for name, value in zip(PARAMETERS, row, strict=True)}
-        for row in np.asarray(rounds)
-    ]
+    return [in_lab(row) for row in np.asarray(rounds)]

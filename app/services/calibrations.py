@@ -2,42 +2,59 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any, Final, get_args
 
 from app.errors import Invalid, NotFound, problem
-from app.exchange.rows import CertificateRow, MeansRow
-from app.services import jobs, stands, verdicts
+from app.exchange.rows import MeansRow
+from app.services import jobs, priors, stands, verdicts
 from app.services.job_views import job_view
 from app.services.lab import Work
 from app.services.sessions import find_session, measurement_view, views
+from app.services.solving import Stated
 from app.services.views import CalibrationView, JobView, Page, SessionView
 from app.store import measurement, results
-from app.store.tables import Calibration, CalibrationParameter, Measurement
+from app.store.tables import Calibration, CalibrationParameter, Measurement, MeasuringSession
 from solver.records import Method
 
 METHODS: Final = (*get_args(Method), "both")
+TRIALS: Final = 100_000
+"""Monte Carlo draws of a calibration when nobody says otherwise: their intervals' ends are good to a hundredth of u."""
+FEWEST_TRIALS: Final = 10_000
+MOST_TRIALS: Final = 10_000_000
 
 
-def request(work: Work, session_id: int, method: str = "both") -> JobView:
+def request(
+    work: Work, session_id: int, method: str = "both", trials: int = TRIALS, seed: int = 0
+) -> JobView:
     """Ask for a calibration from the measurements that count now.
 
     A second request while the same one waits or runs gives the same job.
 
+    Parameters
+    ----------
+    trials, seed
+        Draws of the Monte Carlo propagation of the uncertainty (0 for none), and of its random numbers.
+
     Raises
     ------
     Invalid
-        Unknown method, or nothing measured yet.
+        Unknown method, a number of trials or a seed out of range, or nothing measured yet.
     """
     find_session(work, session_id)
     if method not in METHODS:
         raise Invalid(problem("unknown-method", "There is no method “%(method)s”. Choose one of %(methods)s.",
                               column="method", method=method, methods=", ".join(METHODS)))  # fmt: skip
+    if not (trials == 0 or FEWEST_TRIALS <= trials <= MOST_TRIALS):
+        raise Invalid(problem("bad-trials", "The number of trials is 0 for none, or from %(fewest)d to %(most)d.",
+                              column="monte_carlo", fewest=FEWEST_TRIALS, most=MOST_TRIALS))  # fmt: skip
+    if not 0 <= seed < 2**63:
+        raise Invalid(problem("bad-seed", "The seed is a whole number from 0 to 2⁶³ − 1.", column="seed"))
     inputs = [row.id for row in measurement.current(work.db, session_id)]
     if not inputs:
         raise Invalid(problem("nothing-measured", "No position of this session has been measured yet."))
-    wanted = {"method": method, "inputs": inputs}
+    wanted = {"method": method, "inputs": inputs, "trials": trials, "seed": seed}
     running = results.jobs_of(work.db, [session_id]).get(session_id)
     if running is not None and running.state in results.ACTIVE and running.request == wanted:
         return job_view(running)
@@ -48,21 +65,23 @@ def prepare(work: Work, session_id: int, wanted: Mapping[str, Any]) -> dict[str,
     """What the solving process needs: rows in laboratory units, latitude, method."""
     session = find_session(work, session_id)
     rows = [means_row(row) for row in measurement.measurements(work.db, wanted["inputs"])]
-    return solver_payload(
-        rows, stands.certificate_rows(session.certificate), session.latitude_deg, wanted["method"]
-    )
-
-
-def solver_payload(
-    rows: Sequence[MeansRow], certificate: Sequence[CertificateRow], latitude_deg: float, method: str
-) -> dict[str, Any]:
-    """The payload of `app.services.computing.calibrate`."""
     return {
         "means": [asdict(row) for row in rows],
-        "certificate": [asdict(row) for row in certificate],
-        "latitude_deg": latitude_deg,
-        "method": method,
+        "certificate": [asdict(row) for row in stands.certificate_rows(session.certificate)],
+        "latitude_deg": session.latitude_deg,
+        "method": wanted["method"],
+        "stated": asdict(stated(work, session, wanted)),
     }
+
+
+def stated(work: Work, session: MeasuringSession, wanted: Mapping[str, Any]) -> Stated:
+    """What is known of a session beside its currents and its certificate."""
+    return Stated(
+        uncertainties=stands.statement(session.certificate),
+        prior=priors.expectation(work, session),
+        trials=wanted.get("trials", 0),
+        seed=wanted.get("seed", 0),
+    )
 
 
 def store(work: Work, session_id: int, wanted: Mapping[str, Any], output: Mapping[str, Any]) -> int:

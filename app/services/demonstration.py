@@ -16,10 +16,11 @@ import numpy as np
 from app.exchange.records import means_row, write_record_parquet
 from app.exchange.rows import CertificateRow, MeansRow
 from app.services import access, calibrations, gyros, ingest, stands
-from app.services.computing import solved
+from app.services.calibrations import TRIALS
 from app.services.lab import Lab, Person, Work
-from app.services.sessions import NewSession, open_session
+from app.services.sessions import NewSession, find_session, open_session
 from app.services.simulated import certificate_lab, degrees, records_lab, truth_values
+from app.services.solving import solved
 from app.store import measurement
 from simdevice.bench import Bench, mean_currents, run_session
 from simdevice.certificate import draw_certificate, sixteen_positions
@@ -122,7 +123,7 @@ def _measure(work: Work, visit: _Visit, stand: Stand, rows: Sequence[Certificate
         ),
     )  # fmt: skip
     ingest.save(work, session.id, _kept(work, bench) if visit.last else _means_only(bench, visit.at))
-    _solve(work, session.id, rows)
+    _solve(work, session.id, rows, TRIALS if visit.last else 0)
 
 
 def _means_only(bench: Bench, at: datetime) -> list[ingest.Measured]:
@@ -153,10 +154,11 @@ def _means(bench: Bench, at: datetime) -> list[MeansRow]:
     ]  # fmt: skip
 
 
-def _solve(work: Work, session_id: int, rows: Sequence[CertificateRow]) -> None:
+def _solve(work: Work, session_id: int, rows: Sequence[CertificateRow], trials: int) -> None:
     measured = measurement.current(work.db, session_id)
-    output = solved([calibrations.means_row(row) for row in measured], rows, LATITUDE_DEG, "both")
-    wanted: dict[str, Any] = {"method": "both", "inputs": [row.id for row in measured]}
+    wanted: dict[str, Any] = {"method": "both", "inputs": [row.id for row in measured], "trials": trials}
+    stated = calibrations.stated(work, find_session(work, session_id), wanted)
+    output = solved([calibrations.means_row(row) for row in measured], rows, LATITUDE_DEG, "both", stated)
     calibrations.store(work, session_id, wanted, output)
 
 

@@ -42,7 +42,7 @@ def request(work: Work, new: NewSimulation) -> tuple[SessionView, JobView]:
         session.type, new.gyro, new.stand, session.start, new.seed, new.duration_s, new.rate_hz,
         new.noise_deg_per_h,
     )  # fmt: skip
-    wanted = {"conditions": asdict(conditions), "method": new.method}
+    wanted = {"conditions": asdict(conditions), "method": new.method, "trials": calibrations.TRIALS}
     return session, jobs.submit(work, "simulate", wanted, session.id)
 
 
@@ -68,12 +68,14 @@ def _check(new: NewSimulation) -> None:
 def prepare(work: Work, session_id: int, wanted: Mapping[str, Any]) -> dict[str, Any]:
     """What the simulating process needs."""
     session = find_session(work, session_id)
+    known = calibrations.stated(work, session, wanted)
     return {
         "records": str(work.files.folder),
         "certificate": [asdict(row) for row in stands.certificate_rows(session.certificate)],
         "latitude_deg": session.latitude_deg,
         "conditions": dict(wanted["conditions"]),
         "method": wanted["method"],
+        "stated": asdict(known),
     }
 
 

@@ -44,8 +44,8 @@ def worst(verdicts: Iterable[Verdict]) -> Verdict:
 
 
 def main_method(calibration: Calibration) -> str:
-    """The method whose values stand for the result: least squares, unless only the paper's was asked."""
-    return "paper" if calibration.method == "paper" else "least-squares"
+    """The method whose values stand for the result: least squares where both were asked for."""
+    return "least-squares" if calibration.method == "both" else calibration.method
 
 
 def summary(calibration: Calibration) -> ResultSummary:
