@@ -26,6 +26,7 @@ from app.api import (
     stands,
     types,
     uploads,
+    validation,
 )
 from app.api.health import router as health
 from app.api.links import ROOT
@@ -39,7 +40,7 @@ _DESCRIPTION: Final = (
 )
 _NOUNS: Final = (
     gyros, history, types, stands, certificates, uploads, sessions, positions, calibrations, simulations,
-    jobs, docs,
+    jobs, validation, docs,
 )  # fmt: skip
 
 

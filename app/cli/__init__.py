@@ -26,6 +26,7 @@ _WHERE: Final = {
     "upload": "upload:upload",
     "user": "accounts:users",
     "token": "accounts:tokens",
+    "validate": "validate:validate",
 }
 
 

@@ -3,7 +3,8 @@
 Addresses: ``/`` today · ``/sessions`` ``/sessions/new`` ``/sessions/{id}`` · ``/results``
 ``/results/{id}`` · ``/measurements/{id}`` · ``/gyros`` ``/gyros/{serial}`` (its history)
 ``/gyros/{serial}/edit`` · ``/types/{name}`` · ``/stands`` ``/stands/{name}`` · ``/certificates``
-``/certificates/{stand}/{number}`` · ``/simulations/new`` · ``/jobs/{id}`` · ``/method``.
+``/certificates/{stand}/{number}`` · ``/simulations/new`` · ``/jobs/{id}`` · ``/method`` ·
+``/validation`` ``/validation/{report}``.
 
 State is in the address: filters, sorting and pages of a list are GET. A form that cannot be used
 comes back with status 422 and what was typed. `mount` puts everything into an application whose
@@ -32,6 +33,7 @@ from app.pages import (
     stands,
     today,
     types,
+    validation,
 )
 from app.pages.base import STATIC, Language
 
@@ -40,7 +42,7 @@ __all__ = ["errors", "mount", "router"]
 router = APIRouter(include_in_schema=False)
 for _noun in (
     today, sessions, session_files, entry, results, measurements, gyros, history, types, stands,
-    certificates, simulations, jobs, method, sign_in, choices, assets,
+    certificates, simulations, jobs, method, validation, sign_in, choices, assets,
 ):  # fmt: skip
     router.include_router(_noun.router)
 

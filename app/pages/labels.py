@@ -66,7 +66,7 @@ _ORIGINS: Final = {
 
 _KINDS: Final = {
     "calibrate": marked("Calibration"), "import": marked("Reading of records"),
-    "simulate": marked("Simulation"),
+    "simulate": marked("Simulation"), "validate": marked("Validation"),
 }  # fmt: skip
 
 _PHASES: Final = {

@@ -11,11 +11,11 @@ from app.services.views import JobView
 from app.store import results
 from app.store.tables import Job
 
-_PRIORITY: Final = {"calibrate": 10, "import": 30, "simulate": 50}
+_PRIORITY: Final = {"calibrate": 10, "import": 30, "simulate": 50, "validate": 70}
 """Lower runs first: a person waits for a calibration."""
 
 
-def submit(work: Work, kind: str, request: Mapping[str, Any], session_id: int) -> JobView:
+def submit(work: Work, kind: str, request: Mapping[str, Any], session_id: int | None) -> JobView:
     """Put a job in the queue in the same transaction as what it works on."""
     row = Job(
         id=str(uuid.uuid4()), kind=kind, state="queued", session_id=session_id, request=dict(request),

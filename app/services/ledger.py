@@ -10,7 +10,7 @@ from typing import Any, Final
 from app.errors import AppError, Problem
 from app.jobs.ledger import Task
 from app.jobs.problems import given_up
-from app.services import calibrations, ingest, simulations
+from app.services import calibrations, ingest, simulations, validation
 from app.services.access import SYSTEM
 from app.services.job_views import stored_problem
 from app.services.lab import Lab, Person, Work
@@ -25,15 +25,21 @@ sooner, by the engine (`app.jobs.ledger.MAX_CRASHES`)."""
 
 @dataclass(frozen=True, slots=True)
 class _Kind:
+    """What is computed where; `prepare` and `store` get the session's number, None for a kind without one."""
+
     function: str
-    prepare: Callable[[Work, int, Mapping[str, Any]], dict[str, Any]]
-    store: Callable[[Work, int, Mapping[str, Any], Mapping[str, Any]], int | None]
+    prepare: Callable[[Work, Any, Mapping[str, Any]], dict[str, Any]]
+    store: Callable[[Work, Any, Mapping[str, Any], Mapping[str, Any]], int | None]
+    of_session: bool = True
 
 
 _KINDS: Final = {
     "calibrate": _Kind("app.services.computing:calibrate", calibrations.prepare, calibrations.store),
     "import": _Kind("app.services.computing:import_records", ingest.prepare_import, ingest.store_import),
     "simulate": _Kind("app.services.computing:simulate", simulations.prepare, simulations.store),
+    validation.KIND: _Kind(
+        "app.services.validating:validate", validation.prepare, validation.store, of_session=False
+    ),
 }
 
 
@@ -96,8 +102,8 @@ def _open_job(work: Work, job_id: str) -> Job | None:
     return row if row is not None and row.state in results.ACTIVE else None
 
 
-def _session(row: Job) -> int:
-    if row.session_id is None:
+def _session(row: Job) -> int | None:
+    if row.session_id is None and _KINDS[row.kind].of_session:
         raise ValueError(f"job {row.id} belongs to no session")
     return row.session_id
 

@@ -117,4 +117,6 @@ def _result(view: JobView) -> str | None:
         return links.calibration(view.calibration)
     if view.kind == "import" and view.state == "succeeded" and view.session is not None:
         return links.session(view.session)
+    if view.kind == "validate" and view.state == "succeeded":
+        return f"{links.ROOT}/validation"
     return None

@@ -13,7 +13,7 @@ from app.services.lab import Lab
 
 READABLE = [
     "/", "/gyros", "/types/GVK-6", "/stands", "/stands/S1", "/certificates", "/certificates/S1/C-17", "/method",
-    "/sessions", "/results", "/gyros/0417",
+    "/validation", "/sessions", "/results", "/gyros/0417",
 ]  # fmt: skip
 WRITABLE = [
     "/sessions/new",
