@@ -138,8 +138,13 @@ def conclude(
     return Solved(replace(estimate, iterations=history), problem, gain, values, noise.scatter)
 
 
-def judge_residuals(problem: Problem, values: Array, gain: Array, noise: Noise, dof: int) -> Scatter:
-    """Standardise the residuals and mark outliers; nothing where their noise is unknown or only rounding."""
+def judge_residuals(
+    problem: Problem, values: Array, gain: Array, noise: Noise, dof: int, *, apart: bool = False
+) -> Scatter:
+    """Standardise the residuals and mark outliers; nothing where their noise is unknown or only rounding.
+
+    `apart`: the scatter is not the mean square of these residuals, so that blunders are not in it.
+    """
     equations = problem.equations
     size = gain.shape[1]
     known = noise.basis == "given" or (noise.basis == "scatter" and not only_rounding(noise.rest, problem))
@@ -147,7 +152,7 @@ def judge_residuals(problem: Problem, values: Array, gain: Array, noise: Noise, 
         return Scatter(np.full(size, np.nan), np.zeros(size, dtype=np.bool_))
     sensitivity = np.eye(size) - equations.design @ gain
     freedom = None if noise.basis == "given" else dof
-    return judge(equations.residuals(values), sensitivity, noise.visible, freedom)
+    return judge(equations.residuals(values), sensitivity, noise.visible, freedom, apart=apart)
 
 
 def fit_of(noise: Noise, dof: int, solution: LinearSolution, *, with_spectrum: bool) -> Fit:

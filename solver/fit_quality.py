@@ -24,6 +24,8 @@ from solver.records import Array
 FALSE_ALARM: Final = 0.01
 """Probability that the outlier test marks anything in a session of good data."""
 _NONE_LEFT: Final = 1e-9
+_OF_A_MEDIAN: Final = 0.37
+"""Efficiency of the median deviation: its standard deviation is that of a mean square of so many fewer values."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +36,9 @@ class Scatter:
     outliers: NDArray[np.bool_]
 
 
-def judge(residuals: Array, sensitivity: Array, noise: Array, dof: int | None) -> Scatter:
+def judge(
+    residuals: Array, sensitivity: Array, noise: Array, dof: int | None, *, apart: bool = False
+) -> Scatter:
     """Standardise the residuals and mark outliers.
 
     Parameters
@@ -46,6 +50,9 @@ def judge(residuals: Array, sensitivity: Array, noise: Array, dof: int | None) -
         R, covariance of the rates' noise.
     dof
         Degrees of freedom of `noise` when it is estimated from these residuals; None when given.
+    apart
+        Whether `noise` is estimated in a way that blunders have no part in (a median): residuals are
+        then compared with Student's distribution as they are.
     """
     standardised = _standardise(residuals, sensitivity, noise)
     outliers = np.zeros(len(residuals), dtype=np.bool_)
@@ -55,11 +62,11 @@ def judge(residuals: Array, sensitivity: Array, noise: Array, dof: int | None) -
         worst = int(np.argmax(size))
         left = len(residuals) - int(outliers.sum())
         freedom = None if dof is None else dof - int(outliers.sum())
-        if not _stands_out(float(size[worst]), left, freedom):
+        if not _stands_out(float(size[worst]), left, dof if apart else freedom, apart=apart):
             return Scatter(standardised, outliers)
         outliers[worst] = True
         weight = influence[worst, worst]
-        if dof is not None and freedom is not None and freedom > 1:
+        if not apart and freedom is not None and freedom > 1:
             noise = noise * (max(0.0, freedom - size[worst] ** 2) / (freedom - 1))
         rest = rest - influence[:, worst] * (rest[worst] / weight)
         influence = influence - np.outer(influence[:, worst], influence[worst]) / weight
@@ -75,13 +82,15 @@ def _standardise(residuals: Array, sensitivity: Array, noise: Array) -> Array:
     return out
 
 
-def _stands_out(size: float, count: int, dof: int | None) -> bool:
+def _stands_out(size: float, count: int, dof: int | None, *, apart: bool) -> bool:
     """Whether the largest of `count` standardised residuals is too large for chance."""
     level = FALSE_ALARM / (2 * max(1, count))
     if dof is None:
         return bool(size > -special.ndtri(level))
     if dof < 2:
         return False
+    if apart:
+        return bool(size > -special.stdtrit(_OF_A_MEDIAN * dof, level))
     room = dof - size**2
     if room <= 0:
         return True
