@@ -101,8 +101,8 @@ def _conditions(metadata: Mapping[str, str]) -> tuple[datetime | None, float | N
 def means_row(record: CurrentRecord) -> MeansRow:
     """Mean currents of a record, with their standard uncertainties, its duration and rate.
 
-    The uncertainty allows for correlated samples (`solver.noise`). It is None for a channel that
-    does not change at all, whose noise nobody knows.
+    The uncertainty allows for correlated samples (`solver.noise`) and has its degrees of freedom. Both
+    are None for a channel that does not change at all, whose noise nobody knows.
 
     Parameters
     ----------
@@ -124,4 +124,6 @@ def means_row(record: CurrentRecord) -> MeansRow:
         started_at=record.started_at,
         temperature_c=record.temperature_c,
         repeat=record.repeat,
+        dof_jx=jx.dof or None,
+        dof_jy=jy.dof or None,
     )
