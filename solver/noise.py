@@ -169,14 +169,15 @@ def cosine_powers(values: Array) -> Array:
     return np.asarray(turned.real**2 / (2.0 * n))
 
 
-def slow_cosines(values: Array) -> Array:
-    """The squares d_j², j = 1 … J, of the slowest cosines of one power, (J,); at least 64 samples.
+def slow_cosines(values: Array, first: int = 0) -> Array:
+    """The squares d_j² of the slowest cosines of one power, (J,), of at least 64 samples.
 
-    They are computed from means over short parts of a long record: J is small.
+    They are computed from means over short parts of a long record: J is small. `first` of them, the
+    slowest, are left out.
     """
     n = len(values)
     length = max(1, n // _FEWEST_PARTS)
-    powers = length * cosine_powers(_means(values, n // length))
+    powers = length * cosine_powers(_means(values, n // length))[first:]
     parts = min(n, _PARTS)
     means = _means(values, parts)
     time = 1.0 if is_constant(means) else integrated_time(autocorrelation(means)).samples
