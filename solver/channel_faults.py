@@ -1,0 +1,117 @@
+"""Faults of one ammeter channel: stuck at a value, or clipped at its limit.
+
+Both show as readings that repeat one another where the gyro's currents cannot. Their rows are
+disbelieved, and the repetition itself is data that the hypothesis predicts.
+"""
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.hypotheses import Hypothesis, measuring_order
+from solver.records import Array, Observations
+
+WITHIN_NOISE: Final = 6.0
+"""Largest difference of readings that may be one value, in units of their u: P ≈ 2e-5 for two, and a
+longer run is judged by its scatter besides."""
+_LEAST_RUN: Final = 2
+_RELATIVE: Final = 1e-4
+_HALF_CLIPPED: Final = 0.1
+_DIFFERENT: Final = 1e-3
+_SURE_RUN: Final = 3
+
+
+def stuck_channels(observations: Observations) -> Iterator[Hypothesis]:
+    """Channels whose last readings, in measuring order, repeat one value."""
+    order = measuring_order(observations)
+    for channel, name in enumerate("xy"):
+        currents, tolerance = _channel(observations, channel)
+        for exact in (True, False):
+            start = _run(currents[order], None if exact else tolerance[order])
+            run = order[start:]
+            if len(run) < _LEAST_RUN or (not exact and np.ptp(currents[run]) == 0):
+                continue
+            for first in (1, 0):  # frozen at its first, good reading; or at a value of no meaning
+                missing = np.zeros((len(order), 2), dtype=np.bool_)
+                missing[run[first:], channel] = True
+                zero = not currents[run].any()
+                yield Hypothesis(
+                    "channel-stuck", observations, tuple(int(row) for row in run[first:]), 2 * len(order),
+                    free=0 if first or zero else 1, missing=missing, repeated=currents[run],
+                    details={"channel": name, "value": float(currents[run[-1]])},
+                )  # fmt: skip
+
+
+def surely_stuck(observations: Observations, x: Array) -> str:
+    """Channels (of ``xy``) that repeat one value exactly at the end, where the orientation changes."""
+    order = measuring_order(observations)
+    found = ""
+    for channel, name in enumerate("xy"):
+        currents, _ = _channel(observations, channel)
+        run = order[_run(currents[order], None) :]
+        if len(run) >= _SURE_RUN and np.ptp(x[run], axis=0).max() > _DIFFERENT:
+            found += name
+    return found
+
+
+def saturated_channels(observations: Observations) -> Iterator[Hypothesis]:
+    """Channels whose largest readings, of either or of both signs, agree."""
+    for channel, name in enumerate("xy"):
+        currents, tolerance = _channel(observations, channel)
+        tried: set[tuple[int, ...]] = set()
+        for height in (np.abs(currents), currents, -currents):
+            for rows in _tops(height, tolerance):
+                if len(rows) < _LEAST_RUN or tuple(rows) in tried:
+                    continue
+                tried.add(tuple(rows))
+                top = rows[height[rows] > height.max() * (1 - _HALF_CLIPPED)]
+                missing = np.zeros((len(currents), 2), dtype=np.bool_)
+                missing[rows, channel] = True
+                level = height[top][
+                    np.abs(height[top] - height.max()) <= tolerance[top] + tolerance[np.argmax(height)]
+                ]
+                yield Hypothesis(
+                    "channel-saturated", observations, tuple(int(row) for row in rows), 6,
+                    free=1 + len(rows) - len(level), missing=missing, repeated=level,
+                    details={"channel": name, "limit": float(height.max())},
+                )  # fmt: skip
+
+
+def _tops(height: Array, tolerance: Array) -> Iterator[NDArray[np.int64]]:
+    """Rows at the top: equal, equal within noise, and with the next one, which may be clipped in part."""
+    largest = height.max()
+    if not largest > 0:
+        return
+    equal = np.flatnonzero(height == largest)
+    near = np.flatnonzero(largest - height <= tolerance + tolerance[np.argmax(height)])
+    yield equal
+    yield near
+    for rows in (equal, near):
+        others = np.setdiff1d(np.arange(len(height)), rows)
+        if len(others):
+            following = others[np.argmax(height[others])]
+            if height[following] > largest * (1 - _HALF_CLIPPED):
+                yield np.sort(np.append(rows, following))
+
+
+def _channel(observations: Observations, channel: int) -> tuple[Array, Array]:
+    """Currents of a channel and how far each may be from a value that it repeats."""
+    currents = (observations.jx, observations.jy)[channel]
+    u = (observations.u_jx, observations.u_jy)[channel]
+    if u is None:
+        return currents, np.full(len(currents), _RELATIVE * float(np.abs(currents).max()))
+    return currents, np.asarray(WITHIN_NOISE / 2 * u)
+
+
+def _run(currents: Array, tolerance: Array | None) -> int:
+    """Where the last run of repeated values begins."""
+    start = len(currents) - 1
+    while start > 0:
+        part = currents[start - 1 :]
+        allowed = 0.0 if tolerance is None else 2.0 * float(tolerance[start - 1 :].max())
+        if np.ptp(part) > allowed:
+            break
+        start -= 1
+    return start

@@ -1,0 +1,278 @@
+"""Every hypothesis of a session scored: what `solver.diagnosis` chooses from.
+
+Mistakes that the fit cannot see (`solver.symmetries`) cost no fit: their parameters follow from those of
+the data as given, and χ² is the same. Whether a prior that separates them from good data by Δ standard
+deviations speaks for them is judged by the fall d of T, which under good data is 2·z·Δ − Δ², z standard
+normal. With z* the quantile of `PRIOR_LEVEL`, the threshold
+
+    d > z*²  for Δ < z*;    2·z*·Δ − Δ²  for z* ≤ Δ < 2·z*;    0 beyond
+
+never gives more false alarms than that, however vague the prior, and loses nothing where it is sharp.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+import numpy as np
+from scipy import special
+
+from solver.channel_faults import saturated_channels, stuck_channels, surely_stuck
+from solver.current_model import regressors
+from solver.hypotheses import (
+    Hypothesis,
+    angle_units,
+    outliers,
+    reversals,
+    same_place,
+    swaps,
+    warm_ups,
+    wrong_positions,
+)
+from solver.hypothesis_fit import UNTOLD
+from solver.hypothesis_score import Score, Session, discrete_threshold
+from solver.records import Array
+from solver.suspicion import Suspicion
+from solver.symmetries import Symmetry, approximate_symmetries, exact_symmetries
+from solver.units import deg_per_h_from_rad_per_s
+from solver.verdicts import number
+
+PRIOR_LEVEL: Final = 6e-3
+"""False alarms of all that only a prior can tell, together."""
+INVISIBLE: Final = frozenset(
+    {"channels-swapped", "channel-sign", "psi-reversed", "theta-reversed", "latitude-sign", "latitude-complement",
+     "current-unit"}
+)  # fmt: skip
+_SPEAKS: Final = 1.0
+_ALIKE: Final = 1e-3
+_NO_EFFECT: Final = 1e-9
+_PLAUSIBLE: Final = 5.0
+_REFINED: Final = 6
+_TWINS: Final = 2.0
+_ROUNDING: Final = 1e-20
+_CERTAIN: Final = 1e3
+"""Bonus of a channel that repeats one value exactly where it cannot."""
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """One hypothesis with all that is said of it.
+
+    Attributes
+    ----------
+    code, rows, details
+    total
+        T, by which explanations are ranked.
+    gain
+        By how much it is better than good data, without the Occam term.
+    significant
+    before, after
+        χ², with the prior's part.
+    fall
+        The same as a sentence shows it: ``measure``, ``before``, ``after``.
+    values, u : (8,) array or None
+        Parameters with the data put right.
+    """
+
+    code: str
+    rows: tuple[int, ...]
+    details: Mapping[str, Any]
+    total: float
+    gain: float
+    significant: bool
+    before: float
+    after: float
+    fall: Mapping[str, str] = field(default_factory=dict)
+    values: Array | None = None
+    u: Array | None = None
+
+    @property
+    def claim(self) -> tuple[Any, ...]:
+        """What it says: explanations of equal claim are variants of one."""
+        if self.code in ("warm-up",):
+            return (self.code,)
+        if self.code in ("channel-stuck", "channel-saturated"):
+            return (self.code, self.details["channel"])
+        if self.code == "outlier":
+            return (self.code, self.rows)
+        told = {**self.details}
+        actual = tuple(round(angle, 6) for angle in told.get("actual", ()))
+        return (self.code, self.rows, actual, told.get("channel"), told.get("factor"))
+
+
+def visible(session: Session, suspicion: Suspicion) -> list[Explanation]:
+    """Score the blunders of single measurements, channels and times."""
+    observations, x, model = session.observations, session.x, session.model
+    moved = swaps(observations, x, model) + wrong_positions(observations, model)
+    moved.sort(key=lambda pair: pair[0])
+    chosen = [hypothesis for _, hypothesis in moved[:_REFINED]]
+    chosen += outliers(observations, suspicion.worst)
+    chosen += warm_ups(observations)
+    chosen += stuck_channels(observations)
+    chosen += saturated_channels(observations)
+    certain = surely_stuck(observations, x)
+    return [_explained(session, session.score(hypothesis), certain) for hypothesis in chosen]
+
+
+def _explained(session: Session, score: Score, certain: str = "") -> Explanation:
+    hypothesis = score.hypothesis
+    assert hypothesis is not None
+    details = dict(hypothesis.details)
+    if score.fitted is not None and hypothesis.course is not None:
+        course = hypothesis.course
+        last = float(course[np.argmax(np.abs(course - course.max()))] - course.max())
+        details["drift"] = tuple(float(size) * (last or 1.0) for size in score.fitted.drift)
+    sure = hypothesis.code == "channel-stuck" and details["channel"] in certain
+    before, after = session.comparable(score)
+    distances = session.distance(session.good.fitted), session.distance(score.fitted)
+    if not session.nearer(score):
+        distances = 0.0, 0.0
+    total = session.total(score) - (_CERTAIN if sure else 0.0)
+    return Explanation(
+        hypothesis.code, hypothesis.rows, details, total, session.gain(score) + session.nearer(score),
+        sure or session.significant(score), before.squares + distances[0], after.squares + distances[1],
+        _fall(session, score), *_parameters(session, score),
+    )  # fmt: skip
+
+
+def _fall(session: Session, score: Score) -> dict[str, str]:
+    before, after = session.comparable(score)
+    if session.told:
+        nearer = session.nearer(score)
+        apart = session.distance(session.good.fitted) if nearer else 0.0
+        return {
+            "measure": "χ²",
+            "before": number(before.squares + apart),
+            "after": number(after.squares + apart - nearer),
+        }
+    roots = [float(np.sqrt(item.variance)) for item in (before, after)]
+    if score.rates is None or session.good.rates is None:
+        return {"measure": "s(J)/J", "before": number(roots[0]), "after": number(roots[1])}
+    rates = [deg_per_h_from_rad_per_s(UNTOLD * root) for root in roots]
+    return {"measure": "s/(°/h)", "before": number(rates[0]), "after": number(rates[1])}
+
+
+def _parameters(session: Session, score: Score) -> tuple[Array | None, Array | None]:
+    if score.fitted is None:
+        return None, None
+    return score.fitted.values, np.sqrt(np.diagonal(session.covariance(score.fitted)))
+
+
+def invisible(session: Session) -> list[Explanation]:
+    """Score the mistakes of the session as a whole."""
+    exact = exact_symmetries(session.observations.latitude)
+    turned = approximate_symmetries(session.observations.latitude)
+    apart = {id(item): _separation(session, item) for item in (*exact, *turned.values())}
+    quantile = _quantile(list(apart.values()))
+    found = [_by_prior(session, item, _threshold(apart[id(item)], quantile)) for item in exact]
+    for hypothesis, gain in _whole(session, turned):
+        separation = apart[id(turned[hypothesis.code])] if hypothesis.code in turned else 0.0
+        threshold = discrete_threshold(hypothesis.members)
+        if separation >= _SPEAKS:
+            threshold = min(threshold, _threshold(separation, quantile))
+        found.append(_turned(session, hypothesis, gain, threshold))
+    return found
+
+
+def _separation(session: Session, symmetry: Symmetry) -> float:
+    """Δ: how far from the prior a gyro that fits it would be, put wrong; 0 where the prior is silent."""
+    prior, fitted = session.prior, session.good.fitted
+    if prior is None or fitted is None:
+        return 0.0
+    middle = np.where(prior.says, prior.values, fitted.values)
+    values, covariance = symmetry.apply(middle, session.covariance(fitted))
+    return float(np.sqrt(prior.distance(values, covariance, fitted.known)[0]))
+
+
+def _quantile(separations: list[float]) -> float:
+    """z* with the level shared by the distinct mistakes that the prior separates, but not widely."""
+    z = -float(special.ndtri(PRIOR_LEVEL))
+    near = sorted(s for s in separations if _SPEAKS <= s < 2.2 * z)
+    classes = sum(1 for i, s in enumerate(near) if not i or s - near[i - 1] > _ALIKE * s)
+    return -float(special.ndtri(PRIOR_LEVEL / max(classes, 1)))
+
+
+def _threshold(separation: float, quantile: float) -> float:
+    if separation < quantile:
+        return quantile**2
+    return max(0.0, 2.0 * quantile * separation - separation**2)
+
+
+def _by_prior(session: Session, symmetry: Symmetry, threshold: float) -> Explanation:
+    fitted, prior = session.good.fitted, session.prior
+    before, values, u = session.distance(fitted), None, None
+    after = before
+    if fitted is not None:
+        values, covariance = symmetry.apply(fitted.values, session.covariance(fitted))
+        u = np.sqrt(np.diagonal(covariance))
+        if prior is not None:
+            after = prior.distance(values, covariance, fitted.known)[0]
+    speaks = _separation(session, symmetry) >= _SPEAKS
+    misfit = session.good.best.squares if session.told else 0.0
+    return Explanation(
+        symmetry.code, (), symmetry.details, 2.0 * float(np.log(len(INVISIBLE))) + after - before, before - after,
+        speaks and before - after > threshold, misfit + before, misfit + after,
+        {"measure": "χ²" if session.told else "D²", "before": number(misfit + before), "after": number(misfit + after)},
+        values, u,
+    )  # fmt: skip
+
+
+def _whole(session: Session, turned: Mapping[str, Symmetry]) -> list[tuple[Hypothesis, float]]:
+    """Angles reversed or in another unit, with about the gain of each, by one batch."""
+    observations, good = session.observations, session.good
+    found = []
+    for hypothesis in (*reversals(observations), *angle_units(observations)):
+        x = regressors(hypothesis.observations)
+        if np.abs(x - session.x).max() > _NO_EFFECT:
+            found.append((hypothesis, x))
+    if not found:
+        return []
+    squares = session.model.whole(np.stack([x for _, x in found]))
+    before = float(session.model.fit()[1].sum())
+    gains = []
+    for (hypothesis, _), square in zip(found, squares, strict=True):
+        if session.told:
+            gain = before - float(square)
+        else:
+            floor = _ROUNDING * float(np.sum(session.model.weights * session.model.currents**2))
+            gain = max(good.best.dof, 0) * float(np.log((before + floor) / (square + floor)))
+        if hypothesis.code in turned and session.prior is not None and good.fitted is not None:
+            moved = turned[hypothesis.code].apply(good.fitted.values, session.covariance(good.fitted))
+            gain += session.distance(good.fitted) - session.prior.distance(*moved, good.fitted.known)[0]
+        gains.append((hypothesis, gain))
+    return gains
+
+
+def _turned(session: Session, hypothesis: Hypothesis, gain: float, threshold: float) -> Explanation:
+    """Score one by its own fit where it may matter, else by the batch's."""
+    if gain < min(threshold, _PLAUSIBLE) - _PLAUSIBLE:
+        total = 2.0 * float(np.log(hypothesis.members)) - gain
+        return Explanation(hypothesis.code, (), hypothesis.details, total, gain, False, np.nan, np.nan)
+    score = session.score(hypothesis)
+    explained = _explained(session, score)
+    # Tests of the misfit hold without a prior; where it speaks, it may be what decides.
+    significant = explained.significant
+    if session.nearer(score) > 0 and not significant:
+        significant = explained.gain > threshold
+    return replace(explained, significant=significant)
+
+
+def twins(session: Session) -> list[tuple[int, int]]:
+    """Measurements whose exchange would not show: they differ by their misalignment alone."""
+    fitted = session.good.fitted
+    if fitted is None or session.good.best.dof < 1:
+        return []
+    at, model = session.observations, session.model
+    predicted = model.rows @ model.fit()[0]
+    weights = (
+        model.weights
+        if session.told
+        else model.weights / max(float(model.fit()[1].sum()) / session.good.best.dof, 1e-300)
+    )
+    one, other = np.triu_indices(len(at), 1)
+    apart = np.sum((predicted[one] - predicted[other]) ** 2 / (1 / weights[one] + 1 / weights[other]), axis=1)
+    limit = _TWINS * discrete_threshold(len(one))
+    return [
+        (int(p), int(r)) for p, r in zip(one[apart < limit], other[apart < limit], strict=True)
+        if not same_place(at, int(p), int(r))
+    ]  # fmt: skip

@@ -1,0 +1,245 @@
+"""One number for every hypothesis, and whether it is significant by itself.
+
+See `solver.diagnosis` for the objective. `Session` holds what all hypotheses share, `Score` what one of
+them comes to.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from solver.current_model import CurrentModel, regressors
+from solver.hypotheses import Hypothesis
+from solver.hypothesis_fit import UNTOLD, Fitted, fit, other_inputs
+from solver.inputs import CommonUncertainty
+from solver.prior import Prior
+from solver.records import Array, Observations
+
+LEVEL: Final = 1e-3
+"""False alarms of outlier and warm-up each, over all their members."""
+DISCRETE_LEVEL: Final = 2e-4
+"""The same for each kind without a free unknown that merely changes rows."""
+OCCAM: Final = 10.0
+"""2·ln(range/u) of a free unknown: anything up to 150 u is as likely."""
+REPETITION: Final = 25.0
+"""Fall of χ² that a stuck or saturated channel must explain: the noise of two readings gives that once in 1e5."""
+CLEAR_RATIO: Final = 40.0
+"""ν·ln of the fall of s² that is asked where χ² stays improbable (with ν = 24, five times)."""
+UNTOLD_RATIO: Final = 25.0
+"""The same where no noise is stated (three times: a second blunder as large leaves half)."""
+DOUBT: Final = 1e-3
+"""Probability of χ² below which the stated noise is no longer trusted for tests."""
+_LEAST_FREEDOM: Final = 3
+_ROUNDING: Final = 1e-10
+
+
+@dataclass(frozen=True, slots=True)
+class Sum:
+    """A sum of squares, without u(J) in units of no meaning, with its degrees of freedom."""
+
+    squares: float
+    dof: int
+
+    @property
+    def variance(self) -> float:
+        """Mean square; the sum itself where no freedom is left."""
+        return self.squares / max(self.dof, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """What one hypothesis comes to.
+
+    Attributes
+    ----------
+    hypothesis
+        None for good data.
+    fitted
+        None where the scale factors do not show.
+    rates
+        Of the eight parameters' fit; None without it.
+    currents
+        Of `CurrentModel`, which has two unknowns more.
+    """
+
+    hypothesis: Hypothesis | None
+    fitted: Fitted | None
+    rates: Sum | None
+    currents: Sum
+
+    @property
+    def best(self) -> Sum:
+        """The eight parameters' where there is one."""
+        return self.rates or self.currents
+
+
+@dataclass(slots=True)
+class Session:
+    """What the hypotheses of one session share; `others` is V' of `solver.hypothesis_fit`."""
+
+    observations: Observations
+    common: CommonUncertainty | None
+    prior: Prior | None
+    x: Array
+    model: CurrentModel
+    others: Array | None
+    told: bool
+    good: Score
+
+    @classmethod
+    def of(
+        cls, observations: Observations, common: CommonUncertainty | None, prior: Prior | None
+    ) -> "Session":
+        """Fit the data as given."""
+        x = regressors(observations)
+        model = current_model(observations, x)
+        told = observations.u_jx is not None and observations.u_jy is not None
+        start = model.parameters(told=told)
+        others = other_inputs(observations, start, common) if told and start is not None else None
+        session = cls(
+            observations, common, prior, x, model, others, told, Score(None, None, None, Sum(0.0, 0))
+        )
+        session.good = session.score(None)
+        return session
+
+    def score(self, hypothesis: Hypothesis | None) -> Score:
+        """Fit a hypothesis; None for good data."""
+        observations, missing, course = self.observations, None, None
+        x, model = self.x, self.model
+        if hypothesis is not None:
+            observations, missing, course = hypothesis.observations, hypothesis.missing, hypothesis.course
+            if observations is not self.observations or missing is not None:
+                x = self.x if observations is self.observations else regressors(observations)
+                model = current_model(observations, x, missing)
+        start = model.parameters(told=self.told)
+        fitted = None if start is None else fit(observations, start, self.others, missing, course)
+        scatter, count = 0.0, 0
+        if hypothesis is not None and hypothesis.repeated is not None:
+            scatter, count = self._scatter(hypothesis)
+        gone = 0 if missing is None else int(missing.sum())
+        currents = Sum(
+            float(model.fit()[1].sum()) + scatter * float(self.model.weights.max()),
+            2 * len(x) - gone - 2 * model.rows.shape[1] + count,
+        )
+        rates = None
+        if fitted is not None:
+            weight = float(self.model.weights.max())
+            if not self.told and hypothesis is not None and count:
+                weight = float(fitted.values["xy".index(hypothesis.details["channel"])] / UNTOLD) ** 2
+            rates = Sum(fitted.squares + scatter * weight, fitted.dof + count)
+        return Score(hypothesis, fitted, rates, currents)
+
+    @staticmethod
+    def _scatter(hypothesis: Hypothesis) -> tuple[float, int]:
+        """Sum of squares, A², and degrees of freedom of the readings that should be one."""
+        values = hypothesis.repeated
+        if values is None or not np.ptp(values):
+            return 0.0, 0
+        return float(np.sum((values - values.mean()) ** 2)), len(values) - 1
+
+    def comparable(self, score: Score) -> tuple[Sum, Sum]:
+        """Sums of good data and of a hypothesis in one and the same kind of fit."""
+        if score.rates is None or self.good.rates is None:
+            return self.good.currents, score.currents
+        return self.good.rates, score.rates
+
+    def fall(self, score: Score) -> float:
+        """By how much the misfit falls: χ², or without u(J) ν·ln s²."""
+        good, other = self.comparable(score)
+        return good.squares - other.squares if self.told else self._ratio(good, other)
+
+    def _ratio(self, good: Sum, other: Sum) -> float:
+        floor = _ROUNDING**2 * float(np.sum(self.model.weights * self.model.currents**2))
+        if good.dof < 1:
+            return 0.0
+        return good.dof * float(np.log((good.variance + floor) / (other.variance + floor)))
+
+    def nearer(self, score: Score) -> float:
+        """By how much D² falls."""
+        if self.prior is None or self.good.fitted is None or score.fitted is None:
+            return 0.0
+        return self.distance(self.good.fitted) - self.distance(score.fitted)
+
+    def total(self, score: Score) -> float:
+        """T, by which hypotheses are ranked, beside that of good data."""
+        assert score.hypothesis is not None
+        occam = 2.0 * float(np.log(score.hypothesis.members)) + OCCAM * score.hypothesis.free
+        return occam - self.fall(score) - self.nearer(score)
+
+    def distance(self, fitted: Fitted | None) -> float:
+        """D² of a fit; 0 without prior or fit."""
+        if self.prior is None or fitted is None:
+            return 0.0
+        return self.prior.distance(fitted.values, self.covariance(fitted), fitted.known)[0]
+
+    def covariance(self, fitted: Fitted) -> Array:
+        """Of a fit; without u(J) from its residuals."""
+        if self.told:
+            return fitted.covariance
+        return fitted.covariance * (fitted.squares / max(fitted.dof, 1))
+
+    def improbable(self, score: Score, level: float) -> bool:
+        """Whether its χ² is too large for the stated noise."""
+        best = score.best
+        return self.told and best.dof > 0 and bool(special.chdtrc(best.dof, best.squares) < level)
+
+    def gain(self, score: Score) -> float:
+        """The fall as a test takes it: against the noise that is left where that is more than stated."""
+        fall = self.fall(score)
+        return self._ratio(*self.comparable(score)) if fall > 0 and self.improbable(score, DOUBT) else fall
+
+    def significant(self, score: Score) -> bool:
+        """Whether good data would hardly ever look as much better under this hypothesis."""
+        hypothesis = score.hypothesis
+        if hypothesis is None or self.comparable(score)[1].dof < (0 if self.told else _LEAST_FREEDOM):
+            return False
+        gain, doubtful = self.gain(score), not self.told or self.improbable(score, DOUBT)
+        if hypothesis.repeated is not None:
+            return gain > (
+                REPETITION if self.told and not doubtful else CLEAR_RATIO if self.told else UNTOLD_RATIO
+            )
+        if hypothesis.free:
+            return self._by_chance(score, doubtful) * hypothesis.members < LEVEL
+        if doubtful:
+            return gain > (CLEAR_RATIO if self.told else UNTOLD_RATIO)
+        return gain > discrete_threshold(hypothesis.members)
+
+    def _by_chance(self, score: Score, doubtful: bool) -> float:
+        """Probability that free unknowns alone improve the fit of good data as much."""
+        assert score.hypothesis is not None
+        free = score.hypothesis.free
+        good, other = self.comparable(score)
+        fall = max(good.squares - other.squares, 0.0)
+        if not doubtful:
+            return float(special.chdtrc(free, fall))
+        if other.dof < 1:
+            return 1.0
+        return float(special.fdtrc(free, other.dof, (fall / free) / other.variance)) if other.squares else 0.0
+
+
+def discrete_threshold(members: int) -> float:
+    """Fall of χ² which a change without free unknowns gives, at most, by chance at `DISCRETE_LEVEL`.
+
+    A change that moves the predictions by δ standard deviations makes χ² of good data fall by
+    2·z·δ − δ², never more than z².
+    """
+    return float(special.ndtri(DISCRETE_LEVEL / members)) ** 2
+
+
+def current_model(
+    observations: Observations, x: Array, missing: NDArray[np.bool_] | None = None
+) -> CurrentModel:
+    """Regression with the noise of the currents; without it each channel in units of its size."""
+    at = observations
+    currents = np.stack((at.jx, at.jy), axis=1)
+    if at.u_jx is not None and at.u_jy is not None:
+        weights = 1.0 / np.stack((at.u_jx, at.u_jy), axis=1) ** 2
+    else:
+        square = np.mean(currents**2, axis=0)
+        weights = np.tile(1.0 / np.where(square > 0, square, 1.0), (len(at), 1))
+    if missing is not None:
+        weights = np.where(missing, 0.0, weights)
+    return CurrentModel.of(x, currents, weights)

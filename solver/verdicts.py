@@ -1,0 +1,247 @@
+"""What a technician reads of a diagnosis: one sentence for each kind of blunder, with its cure."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from solver.errors import Message
+from solver.records import Observations
+from solver.units import deg_from_rad, deg_per_h_from_rad_per_s, ma_from_ampere
+
+_MOST_NAMED: Final = 8
+
+
+def place(theta: float, psi: float, repeat: int = 0) -> str:
+    """Name a position in no language: ``θ 90° ψ 180° ·2`` for its first repeat."""
+    name = f"θ {deg_from_rad(theta):.6g}° ψ {deg_from_rad(psi):.6g}°"
+    return name + (f" ·{repeat + 1}" if repeat else "")
+
+
+def places(observations: Observations, rows: Sequence[int]) -> str:
+    """Name the positions of some rows."""
+    at = observations
+    named = [place(float(at.theta[r]), float(at.psi[r]), int(at.repeat[r])) for r in rows[:_MOST_NAMED]]
+    more = len(rows) - len(named)
+    return ", ".join(named) + (f", … (+{more})" if more > 0 else "")
+
+
+def number(value: float) -> str:
+    """Four digits, thousands written out."""
+    return f"{value:.0f}" if 1e4 <= abs(value) < 1e9 else f"{value:.4g}"
+
+
+def _rate(rate: float) -> str:
+    return f"{deg_per_h_from_rad_per_s(rate):+.3g}"
+
+
+def verdict(
+    code: str,
+    observations: Observations,
+    rows: Sequence[int],
+    details: Mapping[str, Any],
+    fall: Mapping[str, str],
+) -> Message:
+    """The sentence of a finding.
+
+    Parameters
+    ----------
+    code
+    observations
+        As given.
+    rows
+        Measurements that it speaks of.
+    details
+        Of the hypothesis.
+    fall
+        ``measure`` (χ², s of the residuals, or the distance from the prior), ``before`` and ``after``.
+    """
+    named = {**fall, "positions": places(observations, rows)}
+    if code in _IN_THE_FIT:
+        return _in_the_fit(code, observations, rows, details, named)
+    return _of_the_session(code, details, dict(fall))
+
+
+_IN_THE_FIT: Final = frozenset(
+    {"outlier", "positions-swapped", "position-wrong", "channel-stuck", "channel-saturated", "warm-up"}
+)
+
+
+def _in_the_fit(
+    code: str,
+    observations: Observations,
+    rows: Sequence[int],
+    details: Mapping[str, Any],
+    named: dict[str, str],
+) -> Message:
+    if code == "outlier":
+        return Message(
+            code,
+            "The currents at %(positions)s do not fit the others (channel %(channel)s): without them %(measure)s "
+            "falls from %(before)s to %(after)s. Measure this position again.",
+            {**named, "channel": details["channel"]},
+        )
+    if code == "positions-swapped":
+        one, other = (places(observations, [row]) for row in rows)
+        return Message(
+            code,
+            "Positions %(one)s and %(other)s look exchanged: with them exchanged %(measure)s falls from %(before)s "
+            "to %(after)s. Check the records, then exchange them or measure both again.",
+            {**named, "one": one, "other": other},
+        )
+    if code == "position-wrong":
+        return Message(
+            code,
+            "The measurement at %(positions)s looks as if it had been made at %(actual)s: taken as that, %(measure)s "
+            "falls from %(before)s to %(after)s. Check the stand's indexing and measure this position again.",
+            {**named, "actual": place(*details["actual"])},
+        )
+    if code == "channel-stuck":
+        return Message(
+            code,
+            "Channel %(channel)s of the ammeter looks stuck: it shows %(value)s mA at the last of the positions, "
+            "%(positions)s. Without these readings %(measure)s falls from %(before)s to %(after)s. Check the "
+            "ammeter and measure these positions again.",
+            {**named, "channel": details["channel"], "value": f"{ma_from_ampere(details['value']):.7g}"},
+        )
+    if code == "channel-saturated":
+        return Message(
+            code,
+            "Channel %(channel)s of the ammeter looks saturated: it shows no more than %(limit)s mA at %(positions)s. "
+            "Without these readings %(measure)s falls from %(before)s to %(after)s. Choose a larger range and "
+            "measure these positions again.",
+            {**named, "channel": details["channel"], "limit": f"{ma_from_ampere(details['limit']):.7g}"},
+        )
+    return Message(
+        code,
+        "The biases drifted during the session, as in a warm-up (x by %(x)s °/h, y by %(y)s °/h from beginning to "
+        "end): with that drift taken out %(measure)s falls from %(before)s to %(after)s. Let the gyro warm up, then "
+        "measure the session again.",
+        {**named, "x": _rate(details["drift"][0]), "y": _rate(details["drift"][1])},
+    )
+
+
+def _of_the_session(code: str, details: Mapping[str, Any], fall: dict[str, str]) -> Message:
+    if code == "angle-unit":
+        return Message(
+            code,
+            "The certificate's angles look as if they had been read in a wrong unit: multiplied by %(factor)s "
+            "(60: arcminutes, 3600: degrees taken for arcseconds), %(measure)s falls from %(before)s to %(after)s. "
+            "Check the unit in the certificate's header.",
+            {**fall, "factor": f"{details['factor']:.4g}"},
+        )
+    if code == "channels-swapped":
+        return Message(
+            code,
+            "The channels x and y look exchanged: with them exchanged %(measure)s falls from %(before)s to "
+            "%(after)s. Check the ammeter's wiring and the columns of the file.",
+            fall,
+        )
+    if code == "channel-sign":
+        return Message(
+            code,
+            "The sign of channel %(channel)s looks reversed: with it reversed %(measure)s falls from %(before)s to "
+            "%(after)s. Check the polarity of the ammeter's leads.",
+            {**fall, "channel": details["channel"]},
+        )
+    if code == "psi-reversed":
+        return Message(
+            code,
+            "The angle ψ looks counted the other way: with ψ reversed %(measure)s falls from %(before)s to "
+            "%(after)s. Check the stand's sense of rotation about its inner axis.",
+            fall,
+        )
+    if code == "theta-reversed":
+        return Message(
+            code,
+            "The angle θ looks counted the other way: with θ reversed %(measure)s falls from %(before)s to "
+            "%(after)s. Check the stand's sense of rotation about its outer axis.",
+            fall,
+        )
+    if code == "latitude-sign":
+        return Message(
+            code,
+            "The latitude looks as if it had the wrong sign: with the other sign %(measure)s falls from %(before)s "
+            "to %(after)s. Check whether the stand is north or south of the equator.",
+            fall,
+        )
+    if code == "latitude-complement":
+        return Message(
+            code,
+            "The latitude looks as if its complement to 90° had been given: with the complement %(measure)s falls "
+            "from %(before)s to %(after)s. Check the stand's latitude.",
+            fall,
+        )
+    return Message(
+        "current-unit",
+        "The currents look as if they had been read in a wrong unit: multiplied by %(factor)s, %(measure)s falls "
+        "from %(before)s to %(after)s. Check the unit in the header of the currents' file (A, mA or µA).",
+        {**fall, "factor": f"{details['factor']:.4g}"},
+    )
+
+
+def unexplained(measure: str, value: float, expected: int) -> Message:
+    """A misfit that no single blunder explains."""
+    return Message(
+        "unexplained",
+        "The misfit is far too large: %(measure)s is %(value)s where %(expected)d is expected, and no single mistake "
+        "explains it. Look for several mistakes, or check the stated uncertainty of the currents.",
+        {"measure": measure, "value": number(value), "expected": expected},
+    )
+
+
+def cannot_exclude(codes: Sequence[str], *, prior_given: bool) -> Message:
+    """Mistakes of the session as a whole that these data do not tell from none."""
+    values = {"kinds": ", ".join(codes)}
+    if prior_given:
+        return Message(
+            "not-excluded",
+            "Neither the fit nor the prior can exclude: %(kinds)s. Give a prior that also speaks of the other "
+            "parameters, or with smaller standard uncertainties.",
+            values,
+        )
+    return Message(
+        "not-excluded",
+        "The fit alone cannot exclude: %(kinds)s. Give a prior (--prior FILE): the type's nominal values or the "
+        "gyro's last calibration.",
+        values,
+    )
+
+
+def twins_alike(observations: Observations, pairs: Sequence[tuple[int, int]]) -> Message:
+    """Positions that are the same in all but their misalignment."""
+    named = [f"{places(observations, [one])} ↔ {places(observations, [other])}" for one, other in pairs]
+    shown = "; ".join(named[:_MOST_NAMED]) + (
+        f"; … (+{len(named) - _MOST_NAMED})" if len(named) > _MOST_NAMED else ""
+    )
+    return Message(
+        "positions-swapped",
+        "An exchange of positions that differ by their misalignment alone would not show, nor change the result by "
+        "much: %(pairs)s.",
+        {"pairs": shown},
+    )
+
+
+def small_angles(factors: Sequence[float]) -> Message:
+    """Certificate angles that do not matter enough for their unit to show."""
+    return Message(
+        "angle-unit",
+        "The certificate's angles are too small to show in the fit whether their unit is right: multiplied by "
+        "%(factors)s they would fit as well. Check the unit in the certificate's header.",
+        {"factors": ", ".join(f"{factor:.4g}" for factor in factors)},
+    )
+
+
+def separate(others: Sequence[str], parameters: Sequence[str]) -> Message:
+    """What would tell equally good explanations apart."""
+    values = {"others": "; ".join(others), "parameters": ", ".join(parameters)}
+    if parameters:
+        return Message(
+            "equivalent",
+            "These explain the data as well: %(others)s. A prior with smaller uncertainties for %(parameters)s would "
+            "tell them apart, or larger certified misalignments.",
+            values,
+        )
+    return Message(
+        "equivalent",
+        "These explain the data as well: %(others)s. Measuring the named positions again would tell them apart.",
+        values,
+    )
