@@ -58,7 +58,7 @@ def robust(
     values = rough(equations.design, equations.right_side, invisible)
     whitening = None
     for _ in range(ROUNDS):
-        latest = _whitening(problem, values)
+        latest = position_whitening(problem, values)
         if latest is None and whitening is not None:
             break
         whitening = latest
@@ -83,7 +83,7 @@ def robust(
     return Solved(estimate, problem, gain, values, noise.scatter, factor**0.5, weights)
 
 
-def _whitening(problem: Problem, values: Array) -> Array | None:
+def position_whitening(problem: Problem, values: Array) -> Array | None:
     """Matrices (n, 2, 2) that bring each position's residuals to currents of unit variance; None without u(J)."""
     u = problem.equations.u_currents
     inverse = inverse_scale(values)
