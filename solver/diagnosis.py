@@ -122,9 +122,9 @@ def diagnose(
 def _distinct(explanations: list[Explanation]) -> list[Explanation]:
     """Of those that say the same, the best; best first."""
     kept: dict[tuple[Any, ...], Explanation] = {}
-    for item in sorted(explanations, key=lambda item: item.total):
+    for item in sorted(explanations, key=lambda item: (not item.significant, item.total)):
         kept.setdefault(item.claim, item)
-    return list(kept.values())
+    return sorted(kept.values(), key=lambda item: item.total)
 
 
 def _findings(session: Session, explanations: list[Explanation]) -> tuple[Finding, ...]:

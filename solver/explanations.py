@@ -111,7 +111,9 @@ def visible(session: Session, suspicion: Suspicion) -> list[Explanation]:
     chosen += stuck_channels(observations)
     chosen += saturated_channels(observations)
     certain = surely_stuck(observations, x)
-    return [_explained(session, session.score(hypothesis), certain) for hypothesis in chosen]
+    scores = [session.score(hypothesis) for hypothesis in chosen]
+    session.by_currents = any(score.rates is None and session.significant(score) for score in scores)
+    return [_explained(session, score, certain) for score in scores]
 
 
 def _explained(session: Session, score: Score, certain: str = "") -> Explanation:
@@ -146,7 +148,7 @@ def _fall(session: Session, score: Score) -> dict[str, str]:
             "after": number(after.squares + apart - nearer),
         }
     roots = [float(np.sqrt(item.variance)) for item in (before, after)]
-    if score.rates is None or session.good.rates is None:
+    if after is score.currents:
         return {"measure": "s(J)/J", "before": number(roots[0]), "after": number(roots[1])}
     rates = [deg_per_h_from_rad_per_s(UNTOLD * root) for root in roots]
     return {"measure": "s/(°/h)", "before": number(rates[0]), "after": number(rates[1])}

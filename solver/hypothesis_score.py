@@ -88,6 +88,8 @@ class Session:
     others: Array | None
     told: bool
     good: Score
+    by_currents: bool = False
+    """Compare all by `CurrentModel`, because what explains the data leaves the scale factors undetermined."""
 
     @classmethod
     def of(
@@ -142,7 +144,7 @@ class Session:
 
     def comparable(self, score: Score) -> tuple[Sum, Sum]:
         """Sums of good data and of a hypothesis in one and the same kind of fit."""
-        if score.rates is None or self.good.rates is None:
+        if self.by_currents or score.rates is None or self.good.rates is None:
             return self.good.currents, score.currents
         return self.good.rates, score.rates
 
