@@ -71,7 +71,8 @@ class SessionModel:
 
     def parameters(self, drawn: Drawn) -> Array:
         """Solve the observation equations of every draw; (8, m)."""
-        values = self.values[:, None] + self.solve(drawn.features, _residuals(drawn, self.values))
+        with np.errstate(invalid="ignore", over="ignore"):  # such draws are looked at one by one
+            values = self.values[:, None] + self.solve(drawn.features, _residuals(drawn, self.values))
         values -= self.temperature_coefficients[:, None] * drawn.temperature
         return values
 
@@ -274,9 +275,6 @@ def _solved(
         system[:, :, far] = np.eye(8)[:, :, None]
     values = basis @ _eliminate(system, right)
     if far.any():
-        if not (np.isfinite(features[:, :, far]).all() and np.isfinite(rest[:, :, far]).all()):
-            raise SolverError(Message("draw-not-finite", "A draw of the inputs is not a finite number. Check the "
-                                      "stated uncertainties: one of them is far too large."))  # fmt: skip
         values[:, far] = orthogonal(features[:, :, far], rest[:, :, far])
     return np.asarray(values)
 
@@ -296,6 +294,11 @@ def _eliminate(system: Array, right: Array) -> Array:
 
 def _designs(features: Array, rest: Array) -> list[tuple[Array, Array]]:
     """The design (2n, 8) and residuals (2n,) of every draw, x and y of a position after one another."""
+    if not (np.isfinite(features).all() and np.isfinite(rest).all()):
+        raise SolverError(
+            Message("draw-not-finite", "A draw of the inputs is not a finite number. Check the stated "
+                    "uncertainties: one of them is far too large.")
+        )  # fmt: skip
     n, m = features.shape[1:]
     design = np.zeros((m, n, 2, 8))
     for parameter, terms in enumerate(_COLUMNS):
