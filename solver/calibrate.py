@@ -16,15 +16,21 @@ from solver.conclusion import Solved
 from solver.error_model import Equations, observation_equations
 from solver.errors import InputError, Message, NotConverged, SolverError
 from solver.estimation import least_squares, paper
+from solver.generalised import generalised
 from solver.inputs import CommonUncertainty
 from solver.measurement_rule import about_fit, about_measurement
 from solver.records import Estimate, Failure, Method, Observations
+from solver.robust import robust
 
-METHODS: Final[tuple[Method, ...]] = ("least-squares", "paper")
-Asked = Literal["least-squares", "paper", "both"]
+Asked = Literal["least-squares", "generalised", "robust", "paper", "both"]
 
 _Solver = Callable[[Equations, Observations, CommonUncertainty | None], Solved]
-_SOLVERS: Final[Mapping[Method, _Solver]] = {"least-squares": least_squares, "paper": paper}
+_SOLVERS: Final[Mapping[Method, _Solver]] = {
+    "least-squares": least_squares,
+    "generalised": generalised,
+    "robust": robust,
+    "paper": paper,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +122,7 @@ def calibrate(
 
 
 def _check(observations: Observations, method: str) -> None:
-    known = (*METHODS, "both")
+    known = (*_SOLVERS, "both")
     if method not in known:
         raise InputError(
             Message(

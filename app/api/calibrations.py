@@ -30,7 +30,7 @@ class CalibrationPart(Part):
 def solve(session_id: Id, body: NewCalibration, caller: Uploader, response: Response) -> Job:
     """Ask for a calibration of what is measured now; the same while it waits or runs is the same job."""
     with caller.write() as work:
-        job = calibrations.request(work, session_id, body.method)
+        job = calibrations.request(work, session_id, body.method, body.monte_carlo, body.seed)
     response.headers["location"] = links.job(job.id)
     return Job.model_validate(job)
 
@@ -47,7 +47,7 @@ def listing(part: Annotated[CalibrationPart, Query()], caller: Reader, request: 
 
 @router.get("/calibrations/{calibration_id}", responses={404: {}}, response_model_exclude_unset=True)
 def detail(calibration_id: Id, caller: Reader) -> Calibration:
-    """A result: parameters, covariance, residuals, fit, iterations, warnings; and its provenance."""
+    """A result: parameters, covariance, residuals, fit, budget, tests, diagnosis; and its provenance."""
     with caller.read() as work:
         found = calibrations.calibration(work, calibration_id)
     return Calibration.model_validate({**found.result, **_provenance(found)})

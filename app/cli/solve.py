@@ -15,10 +15,12 @@ from app.cli.tables import print_result
 from app.errors import AppError, Invalid, Problem, problem
 from app.exchange.certificate import read_certificate
 from app.exchange.json_values import dumps, message_json
+from app.exchange.prior import read_prior
 from app.exchange.rows import CertificateRow
 from app.exchange.session_folder import SessionFiles
 from app.exchange.si import incomplete_uncertainties
-from app.services.solving import solved
+from app.exchange.uncertainties import read_uncertainties
+from app.services.solving import Stated, solved
 from solver.errors import Message
 
 
@@ -28,6 +30,8 @@ class Method(StrEnum):
     LEAST_SQUARES = "least-squares"
     PAPER = "paper"
     BOTH = "both"
+    ROBUST = "robust"
+    GENERALISED = "generalised"
 
 
 def solve(
@@ -40,16 +44,34 @@ def solve(
         typer.Option("--latitude", min=-90, max=90, help="Of the stand, degrees; south negative."),
     ] = None,
     method: Annotated[Method, typer.Option("--method", help="How to solve.")] = Method.LEAST_SQUARES,
+    uncertainties: Annotated[
+        Path | None,
+        typer.Option("--uncertainties", help="What all positions have in common: gain, level, … (JSON)."),
+    ] = None,
+    prior: Annotated[
+        Path | None,
+        typer.Option("--prior", help="What the gyro is expected to be: parameters with u (JSON)."),
+    ] = None,
+    monte_carlo: Annotated[
+        int, typer.Option("--monte-carlo", min=0, help="Draws to propagate the distributions by; 0 for none.")
+    ] = 0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of these draws.")] = 0,
     as_json: Annotated[bool, typer.Option("--json", help="For programs: one JSON object per item.")] = False,
 ) -> None:
     """Calibrate from files: a table for people, JSON for programs."""
     angles = _certificate(certificate) if certificate else None
+    stated = Stated(
+        uncertainties=read_uncertainties(_bytes(uncertainties), str(uncertainties)) if uncertainties else {},
+        prior=_prior(prior) if prior else None,
+        trials=monte_carlo,
+        seed=seed,
+    )
     every = list(items(currents))
     several = len(every) > 1
     failed = False
     for item in every:
         try:
-            result = _solve_one(item, angles, certificate, latitude, method)
+            result = _solve_one(item, angles, certificate, latitude, method, stated)
         except AppError as error:
             if not several:
                 raise
@@ -65,9 +87,22 @@ def solve(
 
 
 def _certificate(path: Path) -> list[CertificateRow]:
+    return read_certificate(_bytes(path), str(path))[0]
+
+
+def _prior(path: Path) -> dict[str, Any]:
+    parameters = read_prior(_bytes(path), str(path))
+    source = Message("prior-file", "the file %(file)s", {"file": path.name})
+    return {
+        "source": message_json(source),
+        "parameters": {name: item._asdict() for name, item in parameters.items()},
+    }
+
+
+def _bytes(path: Path) -> bytes:
     if not path.is_file():
         raise Invalid(problem("no-file", "There is no such file.", file=str(path)))
-    return read_certificate(path.read_bytes(), str(path))[0]
+    return path.read_bytes()
 
 
 def _solve_one(
@@ -76,6 +111,7 @@ def _solve_one(
     named: Path | None,
     latitude: float | None,
     method: Method,
+    stated: Stated,
 ) -> dict[str, Any]:
     session = item.read()
     rows = list(angles or session.certificate)
@@ -93,7 +129,7 @@ def _solve_one(
         )
     try:
         means = session.measured()
-        output = solved(means, rows, latitude_deg, method.value)
+        output = solved(means, rows, latitude_deg, method.value, stated)
     except AppError as error:  # what is wrong between files has no file of its own: it is this item's
         raise type(error)(*(replace(one, file=one.file or item.name) for one in error.problems)) from error
     result: dict[str, Any] = json.loads(output["result"])

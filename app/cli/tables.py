@@ -1,6 +1,6 @@
 """A result as a table in a terminal."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import typer
@@ -14,11 +14,10 @@ _NAMES = {
     "kyx": "Kyx cross-coupling, x into y", "w0x": "ω0x fixed drift, x", "w0y": "ω0y fixed drift, y",
     "wg": "ωg  g-drift, direct", "wk": "ωк  g-drift, quadrature",
 }  # fmt: skip
-_FACTOR = 2.0
 
 
 def print_result(name: str, result: Mapping[str, Any]) -> None:
-    """Print a result: parameters with U (k = 2), the fit, warnings."""
+    """Print a result: parameters with U, the fit, what dominates U, what was found and tested, warnings."""
     console = Console(highlight=False)
     methods = ("least-squares", "paper") if result["method"] == "both" else (result["method"],)
     answers = {method: result[method] if result["method"] == "both" else result for method in methods}
@@ -33,7 +32,11 @@ def print_result(name: str, result: Mapping[str, Any]) -> None:
         table.add_row(label, *cells, _unit(key))
     console.print(table)
     for method in methods:
-        console.print(_fit_line(method, answers[method]))
+        console.print(_fit_line(method, answers[method]), soft_wrap=True)
+        for line in _limits(answers[method]):
+            console.print(f"  {line}", soft_wrap=True)
+    for line in _findings(answers[methods[0]]):
+        console.print(line, soft_wrap=True)
     _print_warnings(result, answers)
 
 
@@ -43,11 +46,11 @@ def _cells(answer: Mapping[str, Any], key: str) -> tuple[str, str]:
     entry = answer["parameters"][key]
     if entry["value"] is None:
         return "not determined", "–"
-    u = entry["standard_uncertainty"]
-    decimals = decimals_of(None if u is None else _FACTOR * u)
-    if u is None or decimals is None:
+    expanded = entry["expanded_uncertainty"]
+    decimals = decimals_of(expanded)
+    if expanded is None or decimals is None:
         return f"{entry['value']:.9g}".replace("-", "−"), "–"
-    return rounded(entry["value"], decimals).replace("-", "−"), rounded(_FACTOR * u, decimals)
+    return rounded(entry["value"], decimals).replace("-", "−"), rounded(expanded, decimals)
 
 
 def _unit(key: str) -> str:
@@ -67,7 +70,38 @@ def _fit_line(method: str, answer: Mapping[str, Any]) -> str:
         parts.append(f"χ² {fit['chi2']:.4g}, p {fit['p_value']:.3g}")
     if answer["iterations"]:
         parts.append(f"{len(answer['iterations'])} rounds")
-    return ", ".join(parts) + "; U is k·u, k = 2, noise of the currents only"
+    return ", ".join(parts)
+
+
+def _limits(answer: Mapping[str, Any]) -> Iterator[str]:
+    """What U consists of, whether draws confirm it, and which further terms the data support."""
+    if not answer.get("budget"):
+        return
+    factors = [
+        entry["coverage_factor"] for entry in answer["parameters"].values() if entry["coverage_factor"]
+    ]
+    largest: dict[str, list[str]] = {}
+    for name, entry in answer["parameters"].items():
+        if entry["dominated_by"]:
+            largest.setdefault(entry["dominated_by"], []).append(name)
+    sources = {line["code"]: line["source"] for line in answer["budget"]}
+    parts = [f"{sources[code]} for {', '.join(names)}" for code, names in largest.items()]
+    if factors:
+        span = " to ".join(dict.fromkeys(f"{factor:.2f}" for factor in (min(factors), max(factors))))
+        yield f"U is k·u for 95 %, k = {span}; it comes mostly from {'; '.join(parts)}"
+    if answer.get("monte_carlo"):
+        yield f"Monte Carlo: {answer['monte_carlo']['conclusion']['message']}"
+    if answer.get("model"):
+        yield answer["model"]["conclusion"]["message"]
+
+
+def _findings(answer: Mapping[str, Any]) -> Iterator[str]:
+    for number, finding in enumerate(answer.get("diagnosis", ()), start=1):
+        yield f"diagnosis {number}: {finding['message']}"
+        if finding["advice"]:
+            yield f"  {finding['advice']['message']}"
+    for item in answer.get("not_excluded", ()):
+        yield f"note: {item['message']}"
 
 
 def _print_warnings(result: Mapping[str, Any], answers: Mapping[str, Mapping[str, Any]]) -> None:

@@ -1,24 +1,29 @@
 """A calibration as JSON in laboratory units: what the API, the command and the pages give out."""
 
 import math
-from collections.abc import Sequence
-from typing import Literal
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from app.exchange.examination import angle_deg
 from app.exchange.json_values import Json, finite, message_json
 from app.exchange.limits import budget_json, expanded_json, in_lab
 from app.exchange.si import PARAMETER_UNITS, covariance_lab, parameter_lab
 from solver import units
 from solver.budget import Budget
-from solver.calibrate import Calibration
-from solver.records import PARAMETERS, Array, Estimate, Failure, Fit, Observations
+from solver.calibrate import Asked, Calibration
+from solver.records import PARAMETERS, Array, Estimate, Failure, Fit, Method, Observations
 
-ResultMethod = Literal["least-squares", "paper", "both"]
+ResultMethod = Asked
 
 
-def calibration_json(calibration: Calibration, method: ResultMethod) -> Json:
-    """Write a calibration as JSON: parameters, covariance, residuals, fit, iterations, warnings.
+def calibration_json(
+    calibration: Calibration,
+    method: ResultMethod,
+    further: Mapping[Method, Json] | None = None,
+    stated: Json | None = None,
+) -> Json:
+    """Write a calibration as JSON: parameters, covariance, residuals, fit, iterations, budget, warnings.
 
     Parameters
     ----------
@@ -27,6 +32,10 @@ def calibration_json(calibration: Calibration, method: ResultMethod) -> Json:
     method
         One method gives its result at the top level. ``both`` gives each under its own name,
         whole, so that a reader of one needs nothing from outside it.
+    further
+        What else is known of a method's answer, by method: what tests and draws tell.
+    stated
+        What was known beside currents and certificate; it stands at the top level.
 
     Returns
     -------
@@ -34,18 +43,21 @@ def calibration_json(calibration: Calibration, method: ResultMethod) -> Json:
         Only what JSON knows: a value that is unknown or not finite is None. A method that gave no
         estimate has ``error`` instead of its numbers, with the rounds it went through.
     """
+    more = further or {}
+    told = {} if stated is None else {"stated": stated}
     if method != "both":
-        return _one(calibration, method)
+        return {**_one(calibration, method), **more.get(method, {}), **told}
+    names: tuple[Method, ...] = ("paper", "least-squares")
     return {
         "method": "both",
         "solver_version": calibration.solver_version,
         "input_hash": calibration.input_hash,
-        "paper": _one(calibration, "paper"),
-        "least-squares": _one(calibration, "least-squares"),
+        **{name: {**_one(calibration, name), **more.get(name, {})} for name in names},
+        **told,
     }
 
 
-def _one(calibration: Calibration, method: Literal["least-squares", "paper"]) -> Json:
+def _one(calibration: Calibration, method: Method) -> Json:
     answer = calibration.answers.get(method)
     if answer is None:
         raise ValueError(f"this calibration has no answer of the method {method}")
@@ -99,8 +111,8 @@ def _residuals(estimate: Estimate, observations: Observations) -> list[Json]:
     rates = units.deg_per_h_from_rad_per_s(estimate.residuals)
     return [
         {
-            "theta_deg": _angle(theta),
-            "psi_deg": _angle(psi),
+            "theta_deg": angle_deg(theta),
+            "psi_deg": angle_deg(psi),
             "repeat": int(repeat),
             "x_deg_per_h": finite(rate[0]),
             "y_deg_per_h": finite(rate[1]),
@@ -119,11 +131,6 @@ def _residuals(estimate: Estimate, observations: Observations) -> list[Json]:
             strict=True,
         )
     ]
-
-
-def _angle(angle_rad: float) -> float:
-    """Stand angle in degrees as it was written: rounding takes off what the two conversions left."""
-    return round(units.deg_from_rad(float(angle_rad)), 11) % 360.0
 
 
 def _fit(fit: Fit) -> Json:

@@ -9,6 +9,9 @@ from app.exchange.json_values import message_from
 from app.figures import DASH, Figure, Measured, decimals_of, figure, measured, plain, significant, superscript
 from app.i18n import gettext, translate
 from app.pages import labels
+from app.pages.result_findings import findings, not_excluded
+from app.pages.result_limits import Budget
+from app.pages.result_tests import Model, MonteCarlo
 from app.plots import LIMIT_SD, Change, Place, Residual, decade
 from app.services.views import COVERAGE_FACTOR, CalibrationView, MeasurementView, ParameterView
 from solver.records import PARAMETERS
@@ -68,8 +71,13 @@ class ResultPage:
         self.main: Json = view.result["least-squares"] if both else view.result
         self.paper: Json | None = view.result["paper"] if both else None
         self.iterated: Json | None = view.result if view.method == "paper" else self.paper
-        self.method = "paper" if view.method == "paper" else "least-squares"
+        self.method = "least-squares" if both else view.method
         self._truth = truth
+        self.budget = Budget(self.main)
+        self.model = Model.of(self.main)
+        self.monte_carlo = MonteCarlo.of(self.main)
+        self.findings = findings(self.main, view.inputs)
+        self.not_excluded = not_excluded(self.main)
 
     @property
     def paper_error(self) -> str:

@@ -5,13 +5,21 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from app.errors import Invalid, problem
+from app.exchange.distributions import monte_carlo_json, no_monte_carlo_json
+from app.exchange.examination import diagnosis_json
 from app.exchange.json_values import Json, dumps
+from app.exchange.parameters import Known
+from app.exchange.prior import prior_si
 from app.exchange.result import ResultMethod, calibration_json
 from app.exchange.rows import CertificateRow, MeansRow
 from app.exchange.si import observations
 from app.exchange.uncertainties import common_uncertainty
-from solver.calibrate import calibrate
+from solver.calibrate import Calibration, calibrate
+from solver.diagnosis import diagnose
+from solver.distributions import compare_with_budget, propagate_distributions
 from solver.errors import SolverError
+from solver.prior import Prior
+from solver.records import Method
 
 Report = Callable[[float, str], None]
 
@@ -38,6 +46,8 @@ class Stated:
     seed: int = 0
 
 
+TRIALS_FOR_TWO_DIGITS: Final = 1_000_000
+"""From so many draws on they judge first order to two digits of u, with fewer to one (JCGM 101, 7.2.2)."""
 NOTHING: Final = Stated()
 
 
@@ -61,11 +71,17 @@ def solved(
         Whatever is wrong with the input, and a calibration that cannot be given.
     """
     common = common_uncertainty(stated.uncertainties)
+    measured = observations(means, certificate, latitude_deg)
     try:
-        calibration = calibrate(observations(means, certificate, latitude_deg), method, common)
+        calibration = calibrate(measured, method, common)
+        diagnosis = diagnose(measured, common, _prior(stated))
     except SolverError as error:
         raise Invalid(problem(error.message.code, error.message.template, **error.message.values)) from error
-    result = calibration_json(calibration, method)
+    examined = diagnosis_json(diagnosis)
+    drawn = _distributions(calibration, stated, report)
+    further = {name: examined | drawn.get(name, {}) for name in calibration.answers}
+    said = {"uncertainties": dict(stated.uncertainties), "prior": stated.prior}
+    result = calibration_json(calibration, method, further, said)
     answers = [result[name] for name in ("least-squares", "paper")] if method == "both" else [result]
     return {
         "result": dumps(result),
@@ -73,6 +89,40 @@ def solved(
         "solver_version": calibration.solver_version,
         "parameters": [row for answer in answers for row in _history_rows(answer)],
     }
+
+
+def _distributions(calibration: Calibration, stated: Stated, report: Report) -> dict[Method, Json]:
+    """The Monte Carlo propagation of each method's estimate; why there is none where it cannot be made."""
+    if not stated.trials:
+        return {}
+    digits = 2 if stated.trials >= TRIALS_FOR_TWO_DIGITS else 1
+    told: dict[Method, Json] = {}
+    for number, (name, solved) in enumerate(calibration.solved.items()):
+
+        def step(fraction: float, number: int = number) -> None:
+            report(0.1 + 0.9 * (number + fraction) / len(calibration.solved), "drawing")
+
+        try:
+            found = propagate_distributions(
+                solved, trials=stated.trials, seed=stated.seed, digits=digits, report=step
+            )
+        except SolverError as error:
+            told[name] = {"monte_carlo": no_monte_carlo_json(stated.trials, stated.seed, error.message)}
+            continue
+        budget = calibration.budget(name)
+        if budget is not None:
+            compared = compare_with_budget(solved, budget, found, digits=digits)
+            told[name] = {"monte_carlo": monte_carlo_json(solved.values, budget, found, compared)}
+    return told
+
+
+def _prior(stated: Stated) -> Prior | None:
+    if stated.prior is None:
+        return None
+    parameters = stated.prior["parameters"]
+    return prior_si(
+        {name: Known(item["value"], item["standard_uncertainty"]) for name, item in parameters.items()}
+    )
 
 
 def _history_rows(answer: Json) -> list[Json]:

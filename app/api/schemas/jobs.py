@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from app.api import links, problems
 from app.api.schemas.common import Incoming, Name, NotNegative, Outgoing, Positive
 from app.api.schemas.results import METHODS
+from app.services.calibrations import TRIALS
 from app.services.views import JobView
 
 
@@ -86,6 +87,10 @@ class NewCalibration(Incoming):
     model_config = ConfigDict(json_schema_extra={"examples": [{"method": "both"}]})
 
     method: METHODS = "both"
+    monte_carlo: Annotated[
+        int, Field(strict=True, ge=0, description="Draws to propagate the distributions by; 0 for none.")
+    ] = TRIALS
+    seed: Annotated[int, Field(strict=True, ge=0, lt=2**63, description="Of these draws.")] = 0
 
 
 class NewSimulation(Incoming):

@@ -8,7 +8,7 @@ from pydantic import ConfigDict, Field
 from app.api.schemas.common import Outgoing
 
 Verdict = Literal["conforms", "conditional", "fails", "no-limit", "undetermined"]
-METHODS = Literal["least-squares", "paper", "both"]
+METHODS = Literal["least-squares", "generalised", "robust", "paper", "both"]
 
 
 class Parameter(Outgoing):
@@ -78,6 +78,12 @@ class Calibration(Outgoing):
     residuals: list[dict[str, Any]] | None = None
     fit: dict[str, Any] | None = None
     iterations: list[dict[str, Any]] | None = None
+    budget: list[dict[str, Any]] | None = None
+    monte_carlo: dict[str, Any] | None = None
+    model: dict[str, Any] | None = None
+    diagnosis: list[dict[str, Any]] | None = None
+    not_excluded: list[dict[str, Any]] | None = None
+    stated: dict[str, Any] | None = None
     warnings: list[dict[str, Any]] | None = None
 
 
