@@ -11,18 +11,19 @@ The uncertainty of a mean current falls with the root of the measuring time down
 fixed total time, more positions mean less time at each, and more of it spent on moving.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.budget import Budget, make_budget
 from solver.constants import EARTH_RATE
 from solver.error_model import currents, observation_equations, scale_matrix
 from solver.errors import InputError, Message
 from solver.geometry import Elements, case_orientation, elements
-from solver.inputs import SOURCES, CommonUncertainty, inputs_of
+from solver.inputs import CommonUncertainty, inputs_of
 from solver.least_squares import solve
 from solver.measurement_rule import LEAST_DURATION, RULE_TOLERANCE
 from solver.observability import find_invisible, names, natural_scale, unobservable
@@ -137,12 +138,9 @@ class Prediction:
     ----------
     duration : float
         Of the measurement at each position, s.
-    u : (8,) array
-        Standard uncertainties of the parameters, SI; NaN for those not determined.
-    covariance : (8, 8) array
-        NaN in their rows and columns.
-    shares
-        Part of each parameter's variance by line of the budget (`solver.inputs.SOURCES`), (8,) each.
+    budget : Budget
+        Standard and expanded uncertainties and what they come from; NaN for parameters that are
+        not determined.
     rank : int
         Combinations of the parameters that will stand out from the noise.
     condition : float
@@ -153,13 +151,21 @@ class Prediction:
     """
 
     duration: float
-    u: Array
-    covariance: Array
-    shares: Mapping[str, Array]
+    budget: Budget
     rank: int
     condition: float
     undetermined: NDArray[np.bool_]
     warnings: tuple[Message, ...]
+
+    @property
+    def covariance(self) -> Array:
+        """Of the parameters, SI, (8, 8)."""
+        return self.budget.covariance
+
+    @property
+    def u(self) -> Array:
+        """Standard uncertainties of the parameters, SI, (8,)."""
+        return np.asarray(np.sqrt(np.diagonal(self.covariance)), np.float64)
 
 
 def duration_at(total: float, moving: float, count: int) -> float:
@@ -210,11 +216,12 @@ def predict(places: Places, duration: float, at: Circumstances) -> Prediction:
     design = whitened(whitening, equations.design)
     right_side = whitened(whitening, equations.right_side[:, None])[:, 0]
     solution = solve(design, right_side, scale=natural_scale(design), invisible=invisible.directions)
+    gain = (solution.gain.reshape(-1, len(places), 2) @ whitening).reshape(len(solution.gain), -1)
     inputs = inputs_of(observations, at.parameters, at.common)
-    effect = solution.gain @ whitened(whitening, inputs.sensitivity)
-    covariance = effect @ inputs.covariance @ effect.T
-    covariance = (covariance + covariance.T) / 2
-    blank, rank, warnings = _undetermined(invisible.parameters, 8 - len(invisible.directions), covariance)
+    effect = gain @ inputs.sensitivity
+    blank, rank, warnings = _undetermined(
+        invisible.parameters, 8 - len(invisible.directions), effect @ inputs.covariance @ effect.T
+    )
     if invisible.parameters.any():
         warnings = (unobservable(invisible), *warnings)
     if below_method(duration):
@@ -222,10 +229,9 @@ def predict(places: Places, duration: float, at: Circumstances) -> Prediction:
             Message("below-method", "Each position is measured for %(duration).3g s; the method asks for "
                     "%(least).3g s.", {"duration": duration, "least": LEAST_DURATION}),
         )  # fmt: skip
-    shares = _shares(inputs.source, inputs.covariance, effect, covariance, blank)
-    covariance[blank] = covariance[:, blank] = np.nan
-    u = np.sqrt(np.diagonal(covariance))
-    return Prediction(duration, u, covariance, shares, rank, solution.condition, blank, warnings)
+    gain[blank] = np.nan
+    budget = make_budget(gain, inputs)
+    return Prediction(duration, budget, rank, solution.condition, blank, warnings)
 
 
 def whitened(whitening: Array, rows: Array) -> Array:
@@ -273,13 +279,3 @@ def _undetermined(
         {"parameters": names(vague), "largest": largest},
     )
     return invisible | vague, rank - max(1, int(np.sum(spread > EARTH_RATE**2))), (words,)
-
-
-def _shares(
-    source: NDArray[np.str_], inputs: Array, effect: Array, covariance: Array, blank: NDArray[np.bool_]
-) -> dict[str, Array]:
-    """Part of each parameter's variance by line of the budget; correlated inputs share a line or split evenly."""
-    whole = effect * (effect @ inputs)  # (8, s): of each input with all it is correlated with
-    variances = np.where(blank, np.nan, np.diagonal(covariance))
-    lines = [line for line in SOURCES if (source == line).any()]
-    return {line: whole[:, source == line].sum(axis=1) / variances for line in lines}

@@ -19,6 +19,7 @@ from app.api import (
     history,
     jobs,
     openapi,
+    planning,
     positions,
     problems,
     sessions,
@@ -39,7 +40,7 @@ _DESCRIPTION: Final = (
     "results. Every number is in the unit that its field's name ends with."
 )
 _NOUNS: Final = (
-    gyros, history, types, stands, certificates, uploads, sessions, positions, calibrations, simulations,
+    gyros, history, types, stands, planning, certificates, uploads, sessions, positions, calibrations, simulations,
     jobs, validation, docs,
 )  # fmt: skip
 

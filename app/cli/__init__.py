@@ -22,6 +22,7 @@ _WHERE: Final = {
     "serve": "service:serve",
     "migrate": "service:migrate",
     "solve": "solve:solve",
+    "plan": "plan:plan",
     "simulate": "simulate:simulate",
     "upload": "upload:upload",
     "user": "accounts:users",

@@ -91,10 +91,10 @@ def test_predicted_u_cover_wrong_angles_a_wrong_ammeter_and_a_base_out_of_level(
     low, high = rms_interval(SESSIONS)
     rms = np.sqrt(np.mean(np.square(errors), axis=0)) / predicted.u
     assert np.all((low < rms) & (rms < high)), rms
-    total = sum(predicted.shares.values())
-    np.testing.assert_allclose(total, 1.0, rtol=1e-9)  # shares of one variance; rounding of a sum
-    assert predicted.shares["ammeter-gain"][0] > 0.9  # 0.1 % of K against 50 ppm of noise
-    assert predicted.shares["level"][PARAMETERS.index("wg")] > 0.01
+    shares = dict(zip(predicted.budget.lines, predicted.budget.shares, strict=True))
+    np.testing.assert_allclose(sum(shares.values()), 1.0, rtol=1e-9)  # of one variance; rounding of a sum
+    assert shares["ammeter-gain"][0] > 0.9  # 0.1 % of K against 50 ppm of noise
+    assert shares["level"][PARAMETERS.index("wg")] > 0.01
 
 
 def test_repeats_lower_the_noise_but_not_what_they_share():
