@@ -38,7 +38,7 @@ def stuck_channels(observations: Observations) -> Iterator[Hypothesis]:
                 missing[run[first:], channel] = True
                 zero = not currents[run].any()
                 yield Hypothesis(
-                    "channel-stuck", observations, tuple(int(row) for row in run[first:]), 2 * len(order),
+                    "channel-stuck", tuple(int(row) for row in run[first:]), 2 * len(order),
                     free=0 if first or zero else 1, missing=missing, repeated=currents[run],
                     details={"channel": name, "value": float(currents[run[-1]])},
                 )  # fmt: skip
@@ -73,7 +73,7 @@ def saturated_channels(observations: Observations) -> Iterator[Hypothesis]:
                     np.abs(height[top] - height.max()) <= tolerance[top] + tolerance[np.argmax(height)]
                 ]
                 yield Hypothesis(
-                    "channel-saturated", observations, tuple(int(row) for row in rows), 6,
+                    "channel-saturated", tuple(int(row) for row in rows), 6,
                     free=1 + len(rows) - len(level), missing=missing, repeated=level,
                     details={"channel": name, "limit": float(height.max())},
                 )  # fmt: skip

@@ -44,6 +44,26 @@ def regressors_at(here: Elements, latitude: float) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
+class Solutions:
+    """Fits of `CurrentModel.solve`.
+
+    Attributes
+    ----------
+    squares : (N,) array
+    dof : (N,) int array
+    start : (N, 8) array
+        The eight parameters nearest to the ten coefficients; NaN where the scale factors do not show.
+    rest : (N, n, 2) array
+        Measured minus fitted currents.
+    """
+
+    squares: Array
+    dof: NDArray[np.int64]
+    start: Array
+    rest: Array
+
+
+@dataclass(frozen=True, slots=True)
 class CurrentModel:
     """One session's regression.
 
@@ -72,41 +92,33 @@ class CurrentModel:
         basis = vh[seen].T / s[seen]
         return cls(x @ basis, basis, currents, weights)
 
-    def fit(self) -> tuple[Array, Array]:
-        """Coefficients (r, 2) and sums of squares (2,)."""
-        normal, right, _ = self._moments()
-        inverse = _pseudo_inverse(normal)
-        coefficients = np.matvec(inverse, right)
-        rest = self.currents - self.rows @ coefficients.T
-        return coefficients.T, np.asarray(np.sum(self.weights * rest**2, axis=0))
+    def solve(self, x: Array, currents: Array, weights: Array, *, told: bool) -> "Solutions":
+        """Fit many sets of the same positions, each with its own regressors, currents and weights.
 
-    def parameters(self, *, told: bool) -> Array | None:
-        """The eight parameters nearest to B, (8,); None where the scale factors do not show.
-
-        `told`: the weights are those of the noise; otherwise it is taken from the residuals.
+        Parameters
+        ----------
+        x : (N, n, 5) array
+        currents, weights : (N, n, 2) array
+        told
+            The weights are those of the noise; otherwise it is taken from the residuals.
         """
-        if self.basis.shape[1] < REGRESSORS:
-            return None
-        normal, right, _ = self._moments()
-        values, vectors = np.linalg.eigh(normal)
-        if not (values[:, 0] > _NULL * values[:, -1]).all():
-            return None
-        root = vectors / np.sqrt(values)[:, None, :]
+        rows = x @ self.basis
+        weighted = rows[:, None] * np.swapaxes(weights, 1, 2)[..., None]
+        values, vectors = np.linalg.eigh(np.swapaxes(weighted, -1, -2) @ rows[:, None])
+        seen = values > _NULL * np.maximum(values[..., -1:], np.finfo(float).tiny)
+        root = np.where(seen[..., None, :], vectors / np.sqrt(np.where(seen, values, 1.0))[..., None, :], 0.0)
+        right = np.einsum("ncpi,npc->nci", weighted, currents)
         coefficients = np.matvec(root, np.vecmat(right, root))
-        squares = np.sum(self.weights * (self.currents - self.rows @ coefficients.T) ** 2, axis=0)
-        freedom = np.maximum(np.sum(self.weights > 0, axis=0) - REGRESSORS, 1)
-        b = coefficients @ self.basis.T
-        m = b[:, :2]
-        spread = np.sum((self.basis[:2] @ root) ** 2, axis=-1).max(axis=1) * (
-            1.0 if told else squares / freedom
-        )
-        least = float(np.linalg.svd(m, compute_uv=False)[-1])
-        if not least > max(_VISIBLE * float(np.sqrt(spread.max())), _NULL * float(np.abs(b).max())):
-            return None
-        k = np.linalg.inv(m) * EARTH_RATE
-        bias, g = -k @ b[:, 2], -k @ b[:, 3:]
-        wg, wk = (g[0, 0] + g[1, 1]) / 2, (g[1, 0] - g[0, 1]) / 2
-        return np.array([k[0, 0], k[1, 1], k[0, 1], k[1, 0], bias[0], bias[1], wg, wk])
+        rest = currents - rows @ np.swapaxes(coefficients, 1, 2)
+        squares = np.sum(weights * rest**2, axis=1)
+        rank = seen.sum(axis=-1)
+        freedom = np.sum(weights > 0, axis=1) - rank
+        start = np.full((len(x), 8), np.nan)
+        if self.basis.shape[1] == REGRESSORS:
+            noise = np.ones_like(squares) if told else squares / np.maximum(freedom, 1)
+            spread = np.sum((self.basis[:2] @ root) ** 2, axis=-1).max(axis=-1) * noise
+            start = _start(coefficients @ self.basis.T, spread.max(axis=1), (rank == REGRESSORS).all(axis=1))
+        return Solutions(squares.sum(axis=1), freedom.sum(axis=1), start, rest)
 
     def replaced(self, index: NDArray[np.int64], x: Array) -> Array:
         """Sum of squares with other regressors at some rows, for each hypothesis, (N,).
@@ -131,16 +143,6 @@ class CurrentModel:
         right = np.einsum("pc,npi->nci", self.weights * self.currents, new)
         return _squares(normal, right, square)
 
-    def without(self, missing: NDArray[np.bool_]) -> Array:
-        """Sum of squares without some currents, `missing` (N, n, 2), for each hypothesis, (N,)."""
-        w = np.where(missing, 0.0, self.weights)
-        normal = np.einsum("npc,pi,pj->ncij", w, self.rows, self.rows)
-        coefficients = np.matvec(
-            _pseudo_inverse(normal), np.einsum("npc,pi->nci", w * self.currents, self.rows)
-        )
-        rest = self.currents - np.einsum("pi,nci->npc", self.rows, coefficients)
-        return np.asarray(np.sum(w * rest**2, axis=(1, 2)))
-
     def _moments(self) -> tuple[Array, Array, Array]:
         """Normal matrices (2, r, r), right sides (2, r) and squares (2,) of both channels."""
         normal = np.einsum("pc,pi,pj->cij", self.weights, self.rows, self.rows)
@@ -156,8 +158,17 @@ def _squares(normal: Array, right: Array, square: Array) -> Array:
     return np.asarray(np.sum(np.maximum(square - np.sum(right * solved, axis=-1), 0.0), axis=-1))
 
 
-def _pseudo_inverse(normal: Array) -> Array:
-    values, vectors = np.linalg.eigh(normal)
-    seen = values > _NULL * np.maximum(values[..., -1:], np.finfo(float).tiny)
-    inverse = np.where(seen, 1.0 / np.where(seen, values, 1.0), 0.0)
-    return np.asarray((vectors * inverse[..., None, :]) @ np.swapaxes(vectors, -1, -2))
+def _start(b: Array, spread: Array, determined: NDArray[np.bool_]) -> Array:
+    """Parameters (N, 8) from coefficients b (N, 2, 5); NaN where K⁻¹ is not clear of its variance `spread`."""
+    m = b[..., :2]
+    least = np.linalg.svd(m, compute_uv=False)[:, -1]
+    clear = determined & (least > np.maximum(_VISIBLE * np.sqrt(spread), _NULL * np.abs(b).max(axis=(1, 2))))
+    start = np.full((len(b), 8), np.nan)
+    if clear.any():
+        k = np.linalg.inv(m[clear]) * EARTH_RATE
+        bias, g = -np.matvec(k, b[clear, :, 2]), -k @ b[clear, :, 3:]
+        start[clear, :4] = np.stack((k[:, 0, 0], k[:, 1, 1], k[:, 0, 1], k[:, 1, 0]), axis=1)
+        start[clear, 4:6] = bias
+        start[clear, 6] = (g[:, 0, 0] + g[:, 1, 1]) / 2
+        start[clear, 7] = (g[:, 1, 0] - g[:, 0, 1]) / 2
+    return start

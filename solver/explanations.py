@@ -10,7 +10,7 @@ normal. With z* the quantile of `PRIOR_LEVEL`, the threshold
 never gives more false alarms than that, however vague the prior, and loses nothing where it is sharp.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
@@ -18,15 +18,13 @@ import numpy as np
 from scipy import special
 
 from solver.channel_faults import saturated_channels, stuck_channels, surely_stuck
-from solver.current_model import regressors
 from solver.hypotheses import (
     Hypothesis,
-    angle_units,
     outliers,
-    reversals,
     same_place,
     swaps,
     warm_ups,
+    whole_sessions,
     wrong_positions,
 )
 from solver.hypothesis_fit import UNTOLD
@@ -103,15 +101,15 @@ class Explanation:
 def visible(session: Session, suspicion: Suspicion) -> list[Explanation]:
     """Score the blunders of single measurements, channels and times."""
     observations, x, model = session.observations, session.x, session.model
-    moved = swaps(observations, x, model) + wrong_positions(observations, model)
+    moved = swaps(observations, x, model) + wrong_positions(observations, x, model)
     moved.sort(key=lambda pair: pair[0])
     chosen = [hypothesis for _, hypothesis in moved[:_REFINED]]
-    chosen += outliers(observations, suspicion.worst)
+    chosen += outliers(len(x), suspicion.worst)
     chosen += warm_ups(observations)
     chosen += stuck_channels(observations)
     chosen += saturated_channels(observations)
     certain = surely_stuck(observations, x)
-    scores = [session.score(hypothesis) for hypothesis in chosen]
+    scores = session.scores(chosen)
     session.by_currents = any(score.rates is None and session.significant(score) for score in scores)
     return [_explained(session, score, certain) for score in scores]
 
@@ -164,16 +162,45 @@ def invisible(session: Session) -> list[Explanation]:
     """Score the mistakes of the session as a whole."""
     exact = exact_symmetries(session.observations.latitude)
     turned = approximate_symmetries(session.observations.latitude)
-    apart = {id(item): _separation(session, item) for item in (*exact, *turned.values())}
-    quantile = _quantile(list(apart.values()))
-    found = [_by_prior(session, item, _threshold(apart[id(item)], quantile)) for item in exact]
-    for hypothesis, gain in _whole(session, turned):
-        separation = apart[id(turned[hypothesis.code])] if hypothesis.code in turned else 0.0
-        threshold = discrete_threshold(hypothesis.members)
-        if separation >= _SPEAKS:
-            threshold = min(threshold, _threshold(separation, quantile))
-        found.append(_turned(session, hypothesis, gain, threshold))
+    thresholds = Thresholds(session, (*exact, *turned.values()))
+    found = [_by_prior(session, item, thresholds) for item in exact]
+    whole = _whole(session, turned)
+    doubtful = [gain > -_PLAUSIBLE for _, gain in whole]
+    fitted = iter(session.scores([h for (h, _), fit_it in zip(whole, doubtful, strict=True) if fit_it]))
+    for (hypothesis, gain), fit_it in zip(whole, doubtful, strict=True):
+        if not fit_it:
+            total = 2.0 * float(np.log(hypothesis.members)) - gain
+            found.append(
+                Explanation(hypothesis.code, (), hypothesis.details, total, gain, False, np.nan, np.nan)
+            )
+            continue
+        score = next(fitted)
+        explained = _explained(session, score)
+        if hypothesis.code in turned and session.nearer(score) > 0 and not explained.significant:
+            threshold = min(discrete_threshold(hypothesis.members), thresholds.of(turned[hypothesis.code]))
+            explained = replace(explained, significant=explained.gain > threshold)
+        found.append(explained)
     return found
+
+
+class Thresholds:
+    """What the prior must gain for each mistake; worked out only when one is asked for."""
+
+    def __init__(self, session: Session, symmetries: Sequence[Symmetry]) -> None:
+        self._session, self._symmetries = session, symmetries
+        self._separations: list[float] = []
+
+    def of(self, symmetry: Symmetry) -> float:
+        """Threshold of d; infinite where the prior says next to nothing."""
+        if not self._separations:
+            self._separations = [_separation(self._session, item) for item in self._symmetries]
+        separation = self._separations[[item is symmetry for item in self._symmetries].index(True)]
+        if separation < _SPEAKS:
+            return np.inf
+        quantile = _quantile(self._separations)
+        if separation < quantile:
+            return quantile**2
+        return max(0.0, 2.0 * quantile * separation - separation**2)
 
 
 def _separation(session: Session, symmetry: Symmetry) -> float:
@@ -194,13 +221,7 @@ def _quantile(separations: list[float]) -> float:
     return -float(special.ndtri(PRIOR_LEVEL / max(classes, 1)))
 
 
-def _threshold(separation: float, quantile: float) -> float:
-    if separation < quantile:
-        return quantile**2
-    return max(0.0, 2.0 * quantile * separation - separation**2)
-
-
-def _by_prior(session: Session, symmetry: Symmetry, threshold: float) -> Explanation:
+def _by_prior(session: Session, symmetry: Symmetry, thresholds: Thresholds) -> Explanation:
     fitted, prior = session.good.fitted, session.prior
     before, values, u = session.distance(fitted), None, None
     after = before
@@ -209,11 +230,10 @@ def _by_prior(session: Session, symmetry: Symmetry, threshold: float) -> Explana
         u = np.sqrt(np.diagonal(covariance))
         if prior is not None:
             after = prior.distance(values, covariance, fitted.known)[0]
-    speaks = _separation(session, symmetry) >= _SPEAKS
     misfit = session.good.best.squares if session.told else 0.0
     return Explanation(
         symmetry.code, (), symmetry.details, 2.0 * float(np.log(len(INVISIBLE))) + after - before, before - after,
-        speaks and before - after > threshold, misfit + before, misfit + after,
+        before > after and before - after > thresholds.of(symmetry), misfit + before, misfit + after,
         {"measure": "χ²" if session.told else "D²", "before": number(misfit + before), "after": number(misfit + after)},
         values, u,
     )  # fmt: skip
@@ -222,17 +242,15 @@ def _by_prior(session: Session, symmetry: Symmetry, threshold: float) -> Explana
 def _whole(session: Session, turned: Mapping[str, Symmetry]) -> list[tuple[Hypothesis, float]]:
     """Angles reversed or in another unit, with about the gain of each, by one batch."""
     observations, good = session.observations, session.good
-    found = []
-    for hypothesis in (*reversals(observations), *angle_units(observations)):
-        x = regressors(hypothesis.observations)
-        if np.abs(x - session.x).max() > _NO_EFFECT:
-            found.append((hypothesis, x))
+    found = whole_sessions(observations, session.x)
     if not found:
         return []
-    squares = session.model.whole(np.stack([x for _, x in found]))
-    before = float(session.model.fit()[1].sum())
+    squares = session.model.whole(
+        np.stack([hypothesis.x for hypothesis in found if hypothesis.x is not None])
+    )
+    before = good.currents.squares
     gains = []
-    for (hypothesis, _), square in zip(found, squares, strict=True):
+    for hypothesis, square in zip(found, squares, strict=True):
         if session.told:
             gain = before - float(square)
         else:
@@ -245,36 +263,17 @@ def _whole(session: Session, turned: Mapping[str, Symmetry]) -> list[tuple[Hypot
     return gains
 
 
-def _turned(session: Session, hypothesis: Hypothesis, gain: float, threshold: float) -> Explanation:
-    """Score one by its own fit where it may matter, else by the batch's."""
-    if gain < min(threshold, _PLAUSIBLE) - _PLAUSIBLE:
-        total = 2.0 * float(np.log(hypothesis.members)) - gain
-        return Explanation(hypothesis.code, (), hypothesis.details, total, gain, False, np.nan, np.nan)
-    score = session.score(hypothesis)
-    explained = _explained(session, score)
-    # Tests of the misfit hold without a prior; where it speaks, it may be what decides.
-    significant = explained.significant
-    if session.nearer(score) > 0 and not significant:
-        significant = explained.gain > threshold
-    return replace(explained, significant=significant)
-
-
 def twins(session: Session) -> list[tuple[int, int]]:
     """Measurements whose exchange would not show: they differ by their misalignment alone."""
     fitted = session.good.fitted
     if fitted is None or session.good.best.dof < 1:
         return []
     at, model = session.observations, session.model
-    predicted = model.rows @ model.fit()[0]
-    weights = (
-        model.weights
-        if session.told
-        else model.weights / max(float(model.fit()[1].sum()) / session.good.best.dof, 1e-300)
-    )
-    one, other = np.triu_indices(len(at), 1)
-    apart = np.sum((predicted[one] - predicted[other]) ** 2 / (1 / weights[one] + 1 / weights[other]), axis=1)
-    limit = _TWINS * discrete_threshold(len(one))
-    return [
-        (int(p), int(r)) for p, r in zip(one[apart < limit], other[apart < limit], strict=True)
-        if not same_place(at, int(p), int(r))
-    ]  # fmt: skip
+    predicted = model.currents - session.rest
+    variance = session.u**2
+    if not session.told:
+        variance = variance * max(session.good.currents.variance, np.finfo(float).tiny)
+    one, other = np.nonzero(np.triu(~same_place(at), 1))
+    apart = np.sum((predicted[one] - predicted[other]) ** 2 / (variance[one] + variance[other]), axis=1)
+    near = apart < _TWINS * discrete_threshold(max(len(one), 1))
+    return [(int(p), int(r)) for p, r in zip(one[near], other[near], strict=True)]

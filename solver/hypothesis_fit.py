@@ -1,4 +1,4 @@
-"""The fit of one hypothesis: eight parameters to a session put right, in the currents' own space.
+"""The fit of hypotheses: eight parameters to a session put right, in the currents' own space, many at once.
 
 The residuals of the observation equations, taken back to currents by K⁻¹, are what was measured
 minus what a gyro of those parameters would give; they are whitened by
@@ -7,23 +7,25 @@ minus what a gyro of those parameters would give; they are whitened by
 
 ΣJ the currents' noise and V' the rates' covariance of every other uncertain input
 (`solver.inputs`). Without given u(J) all rates are taken as equally uncertain by `UNTOLD`, and
-only ratios of sums of squares mean anything. A current that a hypothesis disbelieves has an infinite
+only ratios of sums of squares mean anything. A current that a hypothesis disbelieves has a nearly infinite
 variance and is replaced by the one that the fit predicts, so that it does not stand in the design.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.constants import EARTH_RATE
-from solver.error_model import observation_equations, scale_matrix
+from solver.error_model import design_matrix
+from solver.geometry import Elements
 from solver.inputs import CommonUncertainty, inputs_of
 from solver.records import PARAMETERS, Array, Observations
 
 UNTOLD: Final = 1e-4 * EARTH_RATE
 """Unit of the sums of squares when u(J) is not given, rad/s."""
+_COUNT: Final = len(PARAMETERS)
 _ROUNDS: Final = 2
 _ROUNDS_WITHOUT: Final = 4
 _DISBELIEVED: Final = 1e5
@@ -51,8 +53,8 @@ class Fitted:
         Whitened residuals.
     span : (2n, rank) array
         Orthonormal basis of the whitened design.
-    whitening : (2n, 2n) array
-        By which residuals in currents are whitened.
+    whitening : (2n, 2n) or (n, 2, 2) array
+        By which residuals in currents are whitened, as a whole or position by position.
     """
 
     values: Array
@@ -64,6 +66,29 @@ class Fitted:
     rest: Array
     span: Array
     whitening: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Data:
+    """Sessions put right, N of them.
+
+    Attributes
+    ----------
+    x : (N, n, 5) array
+        Regressors of `solver.current_model`.
+    currents : (N, n, 2) array
+    u : (N, n, 2) array or None
+    missing : (N, n, 2) bool array
+        Currents that are not believed.
+    course : (N, n) array
+        Time course of a drift of both biases, of free size for each; zeros for none.
+    """
+
+    x: Array
+    currents: Array
+    u: Array | None
+    missing: NDArray[np.bool_]
+    course: Array
 
 
 def other_inputs(
@@ -80,114 +105,122 @@ def other_inputs(
     return np.asarray(part @ inputs.covariance[np.ix_(others, others)] @ part.T)
 
 
-def fit(
-    observations: Observations,
-    start: Array,
-    others: Array | None,
-    missing: NDArray[np.bool_] | None = None,
-    course: Array | None = None,
-) -> Fitted | None:
-    """Fit a session put right; None where the scale factors become singular.
+def fit(data: Data, start: Array, others: Array | None) -> list[Fitted | None]:
+    """Fit every session put right; None where the scale factors become singular.
 
     Parameters
     ----------
-    observations
-    start : (8,) array
-        Parameters to begin from.
+    data
+    start : (N, 8) array
+        Parameters to begin from, finite.
     others : (2n, 2n) array, optional
         V'.
-    missing : (n, 2) bool array, optional
-        Currents that are not believed.
-    course : (n,) array, optional
-        Time course of a drift of both biases, of free size for each.
     """
-    values = start
-    told = observations.u_jx is not None and observations.u_jy is not None
-    extra = None if course is None else np.kron(course[:, None], np.eye(2))
-    fitted = None
-    for _ in range(_ROUNDS if missing is None else _ROUNDS_WITHOUT):
-        inverse = _inverse(values)
-        if inverse is None:
-            return None
-        equations = observation_equations(observations)
-        if missing is not None:
-            observations = _filled(observations, inverse, equations.residuals(values), missing)
-            equations = observation_equations(observations)
-        columns = equations.design if extra is None else np.hstack((equations.design, extra))
-        whitening = _whitening(observations, inverse, others, missing, told=told)
-        both = np.column_stack((columns, equations.right_side))
-        whitened = whitening @ (inverse @ both.reshape(len(observations), 2, -1)).reshape(both.shape)
-        fitted = _solve(whitened[:, :-1], whitened[:, -1], whitening, missing)
-        values = fitted.values
-    return fitted
+    count, n, _ = data.x.shape
+    values, alive = start.copy(), np.ones(count, dtype=np.bool_)
+    right_side = (EARTH_RATE * data.x[..., :2]).reshape(count, 2 * n, 1)
+    currents, some = data.currents, data.missing.any()
+    drift = data.course.any()
+    extra = np.kron(data.course[..., None], np.eye(2)) if drift else np.zeros((count, 2 * n, 0))
+    for _ in range(_ROUNDS_WITHOUT if some else _ROUNDS):
+        inverse, usable = _inverse(values)
+        alive &= usable
+        design = _design(data.x, currents)
+        if some:
+            residuals = right_side[..., 0] - np.matvec(design, values)
+            change = np.matvec(inverse[:, None], residuals.reshape(count, n, 2))
+            currents = np.where(data.missing, currents + change, currents)
+            design = _design(data.x, currents)
+        whitening = _whitening(data, inverse, others)
+        both = np.concatenate((design, extra, right_side), axis=-1).reshape(count, n, 2, -1)
+        solved = _solve(_apply(whitening, inverse[:, None] @ both))
+        values = np.where(alive[:, None], solved.values[:, :_COUNT], start)
+    gone = data.missing.sum(axis=(1, 2))
+    return [
+        _one(solved, whitening, index, int(gone[index]), bool(data.course[index].any()))
+        if alive[index]
+        else None
+        for index in range(count)
+    ]
 
 
-def _inverse(values: Array) -> Array | None:
-    k = scale_matrix(values)
-    determinant = k[0, 0] * k[1, 1] - k[0, 1] * k[1, 0]
-    if not abs(determinant) > _SINGULAR * float(np.sum(k * k)):
-        return None
-    return np.asarray(np.array([[k[1, 1], -k[0, 1]], [-k[1, 0], k[0, 0]]]) / determinant)
+@dataclass(frozen=True, slots=True)
+class _Solved:
+    values: Array
+    root: Array
+    rest: Array
+    span: Array
+    seen: NDArray[np.bool_]
+    vh: Array
+    scale: Array
 
 
-def _filled(
-    observations: Observations, inverse: Array, residuals: Array, missing: NDArray[np.bool_]
-) -> Observations:
-    """Put what the parameters predict in place of the missing currents."""
-    change = residuals.reshape(-1, 2) @ inverse.T
-    return replace(
-        observations,
-        jx=observations.jx + np.where(missing[:, 0], change[:, 0], 0.0),
-        jy=observations.jy + np.where(missing[:, 1], change[:, 1], 0.0),
-    )
-
-
-def _whitening(
-    observations: Observations,
-    inverse: Array,
-    others: Array | None,
-    missing: NDArray[np.bool_] | None,
-    *,
-    told: bool,
-) -> Array:
-    """W with Wᵀ·W = V⁻¹, (2n, 2n)."""
-    n = len(observations)
-    blown = np.ones(2 * n) if missing is None else np.where(missing.ravel(), _DISBELIEVED, 1.0)
-    noise = np.zeros(2 * n)
-    if told and observations.u_jx is not None and observations.u_jy is not None:
-        noise = np.stack((observations.u_jx, observations.u_jy), axis=1).ravel()
-        if others is None:
-            return np.diag(1.0 / (noise * blown))
-    rates = UNTOLD**2 * np.eye(2 * n) if not told else np.zeros((2 * n, 2 * n))
-    if told and others is not None:
-        rates = others
-    left = (inverse @ rates.reshape(n, 2, -1)).reshape(2 * n, 2 * n)
-    covariance = (inverse @ left.T.reshape(n, 2, -1)).reshape(2 * n, 2 * n)
-    covariance[np.diag_indices(2 * n)] += noise**2
-    covariance[np.diag_indices(2 * n)] *= blown**2
-    return np.asarray(np.linalg.inv(np.linalg.cholesky((covariance + covariance.T) / 2)), np.float64)
-
-
-def _solve(design: Array, right_side: Array, whitening: Array, missing: NDArray[np.bool_] | None) -> Fitted:
-    scale = np.sqrt(np.einsum("ij,ij->j", design, design))
-    scale[scale == 0] = 1.0
-    u, s, vh = np.linalg.svd(design / scale, full_matrices=False)
-    seen = s > _NO_RANK * s[0]
-    u, root = u[:, seen], (vh[seen].T / s[seen]) / scale[:, None]
-    values = root @ (u.T @ right_side)
-    rest = right_side - design @ values
-    count = len(PARAMETERS)
-    hidden = (vh[~seen] / scale)[:, :count] * scale[:count]
-    known = ~(np.abs(hidden) > _NO_RANK).any(axis=0)
-    gone = 0 if missing is None else int(missing.sum())
+def _one(solved: _Solved, whitening: Array, index: int, gone: int, drift: bool) -> Fitted:
+    seen, scale, root = solved.seen[index], solved.scale[index], solved.root[index, :_COUNT]
+    hidden = (solved.vh[index][~seen] / scale)[:, :_COUNT] * scale[:_COUNT]
+    rest = solved.rest[index]
     return Fitted(
-        values=values[:count],
-        drift=values[count:],
-        covariance=(root @ root.T)[:count, :count],
-        known=known,
+        values=solved.values[index, :_COUNT],
+        drift=solved.values[index, _COUNT:] if drift else np.zeros(0),
+        covariance=root @ root.T,
+        known=~(np.abs(hidden) > _NO_RANK).any(axis=0),
         squares=float(rest @ rest),
-        dof=len(right_side) - gone - int(seen.sum()),
+        dof=len(rest) - gone - int(seen.sum()),
         rest=rest,
-        span=u,
-        whitening=whitening,
+        span=solved.span[index][:, seen],
+        whitening=whitening[index],
     )
+
+
+def _design(x: Array, currents: Array) -> Array:
+    c, d = x[..., 3], x[..., 4]
+    return design_matrix(Elements(c, c, c, d, d), currents[..., 0], currents[..., 1])
+
+
+def _inverse(values: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """K⁻¹ (N, 2, 2), and where it is usable."""
+    kx, ky, kxy, kyx = values[:, :4].T
+    determinant = kx * ky - kxy * kyx
+    usable = np.abs(determinant) > _SINGULAR * np.sum(values[:, :4] ** 2, axis=1)
+    over = np.where(usable, determinant, 1.0)
+    inverse = np.stack((ky / over, -kxy / over, -kyx / over, kx / over), axis=1)
+    return inverse.reshape(-1, 2, 2), usable
+
+
+def _whitening(data: Data, inverse: Array, others: Array | None) -> Array:
+    """W with Wᵀ·W = V⁻¹: (N, n, 2, 2) where positions are independent, else (N, 2n, 2n)."""
+    count, n, _ = data.x.shape
+    blown = np.where(data.missing, _DISBELIEVED, 1.0)
+    if data.u is not None and others is None:
+        return np.asarray((1.0 / (data.u * blown))[..., None] * np.eye(2))
+    if data.u is None:
+        block = UNTOLD**2 * inverse @ np.swapaxes(inverse, -1, -2)
+        blocks = block[:, None] * (blown[..., None] * blown[..., None, :])
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(blocks)))
+    left = (inverse[:, None] @ others.reshape(n, 2, -1)).reshape(count, 2 * n, 2 * n)  # type: ignore[union-attr]
+    covariance = (inverse[:, None] @ np.swapaxes(left, 1, 2).reshape(count, n, 2, -1)).reshape(left.shape)
+    covariance = (covariance + np.swapaxes(covariance, 1, 2)) / 2
+    diagonal = np.arange(2 * n)
+    covariance[:, diagonal, diagonal] += data.u.reshape(count, -1) ** 2
+    covariance[:, diagonal, diagonal] *= blown.reshape(count, -1) ** 2
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
+
+
+def _apply(whitening: Array, blocks: Array) -> Array:
+    """Whiten (N, n, 2, c) into (N, 2n, c)."""
+    count, n, _, columns = blocks.shape
+    if whitening.ndim == 4:
+        return np.asarray((whitening @ blocks).reshape(count, 2 * n, columns))
+    return np.asarray(whitening @ blocks.reshape(count, 2 * n, columns))
+
+
+def _solve(both: Array) -> _Solved:
+    design, right_side = both[..., :-1], both[..., -1]
+    scale = np.sqrt(np.einsum("nij,nij->nj", design, design))
+    scale = np.where(scale == 0, 1.0, scale)
+    u, s, vh = np.linalg.svd(design / scale[:, None, :], full_matrices=False)
+    seen = s > _NO_RANK * s[:, :1]
+    over = np.where(seen, 1.0 / np.where(seen, s, 1.0), 0.0)
+    root = np.swapaxes(vh, 1, 2) * over[:, None, :] / scale[..., None]
+    values = np.matvec(root, np.vecmat(right_side, u))
+    return _Solved(values, root, right_side - np.matvec(design, values), u, seen, vh, scale)

@@ -4,16 +4,16 @@ See `solver.diagnosis` for the objective. `Session` holds what all hypotheses sh
 them comes to.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
 from solver.current_model import CurrentModel, regressors
 from solver.hypotheses import Hypothesis
-from solver.hypothesis_fit import UNTOLD, Fitted, fit, other_inputs
+from solver.hypothesis_fit import UNTOLD, Data, Fitted, fit, other_inputs
 from solver.inputs import CommonUncertainty
 from solver.prior import Prior
 from solver.records import Array, Observations
@@ -78,16 +78,34 @@ class Score:
 
 @dataclass(slots=True)
 class Session:
-    """What the hypotheses of one session share; `others` is V' of `solver.hypothesis_fit`."""
+    """What the hypotheses of one session share.
+
+    Attributes
+    ----------
+    x : (n, 5) array
+        Regressors.
+    u : (n, 2) array
+        Of the currents, A; without u(J) their size.
+    others : (2n, 2n) array or None
+        V' of `solver.hypothesis_fit`.
+    told
+        Whether u(J) is given.
+    good
+        Of the data as given.
+    rest : (n, 2) array
+        Residuals of the currents in `model`.
+    """
 
     observations: Observations
     common: CommonUncertainty | None
     prior: Prior | None
     x: Array
     model: CurrentModel
+    u: Array
     others: Array | None
     told: bool
     good: Score
+    rest: Array
     by_currents: bool = False
     """Compare all by `CurrentModel`, because what explains the data leaves the scale factors undetermined."""
 
@@ -96,51 +114,68 @@ class Session:
         cls, observations: Observations, common: CommonUncertainty | None, prior: Prior | None
     ) -> "Session":
         """Fit the data as given."""
-        x = regressors(observations)
-        model = current_model(observations, x)
-        told = observations.u_jx is not None and observations.u_jy is not None
-        start = model.parameters(told=told)
-        others = other_inputs(observations, start, common) if told and start is not None else None
-        session = cls(
-            observations, common, prior, x, model, others, told, Score(None, None, None, Sum(0.0, 0))
-        )
-        session.good = session.score(None)
+        at = observations
+        told = at.u_jx is not None and at.u_jy is not None
+        x = regressors(at)
+        currents = np.stack((at.jx, at.jy), axis=1)
+        if at.u_jx is not None and at.u_jy is not None:
+            u = np.stack((at.u_jx, at.u_jy), axis=1)
+        else:  # each channel in units of its size
+            square = np.sqrt(np.mean(currents**2, axis=0))
+            u = np.tile(np.where(square > 0, square, 1.0), (len(at), 1))
+        model = CurrentModel.of(x, currents, 1.0 / u**2)
+        solutions = model.solve(x[None], currents[None], model.weights[None], told=told)
+        start = solutions.start[0]
+        others = other_inputs(at, start, common) if told and np.isfinite(start).all() else None
+        score = Score(None, None, None, Sum(float(solutions.squares[0]), int(solutions.dof[0])))
+        session = cls(observations, common, prior, x, model, u, others, told, score, solutions.rest[0])
+        session.good = session.scores([None])[0]
         return session
 
-    def score(self, hypothesis: Hypothesis | None) -> Score:
-        """Fit a hypothesis; None for good data."""
-        observations, missing, course = self.observations, None, None
-        x, model = self.x, self.model
-        if hypothesis is not None:
-            observations, missing, course = hypothesis.observations, hypothesis.missing, hypothesis.course
-            if observations is not self.observations or missing is not None:
-                x = self.x if observations is self.observations else regressors(observations)
-                model = current_model(observations, x, missing)
-        start = model.parameters(told=self.told)
-        fitted = None if start is None else fit(observations, start, self.others, missing, course)
-        scatter, count = 0.0, 0
-        if hypothesis is not None and hypothesis.repeated is not None:
-            scatter, count = self._scatter(hypothesis)
-        gone = 0 if missing is None else int(missing.sum())
-        currents = Sum(
-            float(model.fit()[1].sum()) + scatter * float(self.model.weights.max()),
-            2 * len(x) - gone - 2 * model.rows.shape[1] + count,
-        )
-        rates = None
-        if fitted is not None:
-            weight = float(self.model.weights.max())
-            if not self.told and hypothesis is not None and count:
-                weight = float(fitted.values["xy".index(hypothesis.details["channel"])] / UNTOLD) ** 2
-            rates = Sum(fitted.squares + scatter * weight, fitted.dof + count)
-        return Score(hypothesis, fitted, rates, currents)
+    def scores(self, hypotheses: Sequence[Hypothesis | None]) -> list[Score]:
+        """Fit hypotheses; None is good data."""
+        if not hypotheses:
+            return []
+        count, n = len(hypotheses), len(self.x)
+        x = np.stack([self.x if h is None or h.x is None else h.x for h in hypotheses])
+        own = np.arange(n)
+        order = np.stack([own if h is None or h.order is None else h.order for h in hypotheses])
+        missing = np.zeros((count, n, 2), dtype=np.bool_)
+        course = np.zeros((count, n))
+        for index, hypothesis in enumerate(hypotheses):
+            if hypothesis is not None and hypothesis.missing is not None:
+                missing[index] = hypothesis.missing
+            if hypothesis is not None and hypothesis.course is not None:
+                course[index] = hypothesis.course
+        currents, u = self.model.currents[order], self.u[order]
+        weights = np.where(missing, 0.0, 1.0 / u**2)
+        solutions = self.model.solve(x, currents, weights, told=self.told)
+        fits: list[Fitted | None] = [None] * count
+        able = np.flatnonzero(np.isfinite(solutions.start[:, 0]))
+        for part in (able[~missing[able].any(axis=(1, 2))], able[missing[able].any(axis=(1, 2))]):
+            if len(part):
+                data = Data(
+                    x[part], currents[part], u[part] if self.told else None, missing[part], course[part]
+                )
+                for index, fitted in zip(part, fit(data, solutions.start[part], self.others), strict=True):
+                    fits[index] = fitted
+        return [
+            self._score(h, f, float(solutions.squares[i]), int(solutions.dof[i]))
+            for i, (h, f) in enumerate(zip(hypotheses, fits, strict=True))
+        ]
 
-    @staticmethod
-    def _scatter(hypothesis: Hypothesis) -> tuple[float, int]:
-        """Sum of squares, A², and degrees of freedom of the readings that should be one."""
-        values = hypothesis.repeated
-        if values is None or not np.ptp(values):
-            return 0.0, 0
-        return float(np.sum((values - values.mean()) ** 2)), len(values) - 1
+    def _score(self, hypothesis: Hypothesis | None, fitted: Fitted | None, squares: float, dof: int) -> Score:
+        """Add what a repeated reading is expected to scatter."""
+        scatter, count = 0.0, 0
+        weight = by_currents = 0.0
+        if hypothesis is not None and hypothesis.repeated is not None and np.ptp(hypothesis.repeated):
+            values, channel = hypothesis.repeated, "xy".index(hypothesis.details["channel"])
+            scatter, count = float(np.sum((values - values.mean()) ** 2)), len(values) - 1
+            weight = by_currents = float(self.model.weights[:, channel].max())
+            if fitted is not None and not self.told:
+                weight = float(fitted.values[channel] / UNTOLD) ** 2
+        rates = None if fitted is None else Sum(fitted.squares + scatter * weight, fitted.dof + count)
+        return Score(hypothesis, fitted, rates, Sum(squares + scatter * by_currents, dof + count))
 
     def comparable(self, score: Score) -> tuple[Sum, Sum]:
         """Sums of good data and of a hypothesis in one and the same kind of fit."""
@@ -229,19 +264,3 @@ def discrete_threshold(members: int) -> float:
     2·z·δ − δ², never more than z².
     """
     return float(special.ndtri(DISCRETE_LEVEL / members)) ** 2
-
-
-def current_model(
-    observations: Observations, x: Array, missing: NDArray[np.bool_] | None = None
-) -> CurrentModel:
-    """Regression with the noise of the currents; without it each channel in units of its size."""
-    at = observations
-    currents = np.stack((at.jx, at.jy), axis=1)
-    if at.u_jx is not None and at.u_jy is not None:
-        weights = 1.0 / np.stack((at.u_jx, at.u_jy), axis=1) ** 2
-    else:
-        square = np.mean(currents**2, axis=0)
-        weights = np.tile(1.0 / np.where(square > 0, square, 1.0), (len(at), 1))
-    if missing is not None:
-        weights = np.where(missing, 0.0, weights)
-    return CurrentModel.of(x, currents, weights)

@@ -22,6 +22,7 @@ from solver.records import Array
 GROSS: Final = 2e-3 * EARTH_RATE
 """Scatter of the rates without stated noise that is worth a search, 0.03 °/h, rad/s."""
 _SINGULAR: Final = 1e-9
+_COURSES: Final = 5
 _WORST: Final = 3
 _WORST_BOTH: Final = 2
 
@@ -45,21 +46,17 @@ def suspect(session: Session) -> Suspicion:
     worst = [(int(i) // 2, "xy"[int(i) % 2]) for i in np.argsort(-single, kind="stable")[:_WORST]]
     worst += [(int(i), "xy") for i in np.argsort(-both, kind="stable")[:_WORST_BOTH]]
     falls = [(float(single.max()), 1, 2 * n), (float(both.max()), 2, n)]
-    falls += [(fall, 2, len(courses(session.observations))) for fall in _drifts(session, fitted)]
+    falls += [(fall, 2, _COURSES) for fall in _drifts(session, fitted)]
     alarm = any(_chance(session, fall, free) * members < LEVEL for fall, free, members in falls)
     gross = not session.told and good.best.dof > 0 and np.sqrt(good.best.variance) * UNTOLD > GROSS
     return Suspicion(bool(overall or alarm or gross), worst)
 
 
 def _by_deletion(session: Session) -> Suspicion:
-    n = len(session.observations)
-    masks = np.zeros((3 * n, n, 2), dtype=np.bool_)
-    row = np.arange(n)
-    masks[row, row, 0] = masks[n + row, row, 1] = masks[2 * n + row, row, :] = True
-    squares = session.model.without(masks)
-    single, both = squares[: 2 * n], squares[2 * n :]
-    worst = [(int(i) % n, "xy"[int(i) // n]) for i in np.argsort(single, kind="stable")[:_WORST]]
-    worst += [(int(i), "xy") for i in np.argsort(both, kind="stable")[:_WORST_BOTH]]
+    """Where the scale factors do not show: the largest residuals of the currents."""
+    size = np.abs(session.rest) * np.sqrt(session.model.weights)
+    worst = [(int(i) // 2, "xy"[int(i) % 2]) for i in np.argsort(-size.ravel(), kind="stable")[:_WORST]]
+    worst += [(int(i), "xy") for i in np.argsort(-size.sum(axis=1), kind="stable")[:_WORST_BOTH]]
     return Suspicion(
         session.good.best.dof > 0 and (not session.told or session.improbable(session.good, LEVEL)), worst
     )
@@ -67,7 +64,7 @@ def _by_deletion(session: Session) -> Suspicion:
 
 def _deletions(fitted: Fitted) -> tuple[Array, Array]:
     """Falls of the sum of squares without each current, (2n,), and without each position's both, (n,)."""
-    w, u = fitted.whitening, fitted.span
+    w, u = _dense(fitted.whitening), fitted.span
     spanned = u.T @ w
     g = w.T @ w - spanned.T @ spanned
     b = w.T @ fitted.rest
@@ -86,15 +83,23 @@ def _deletions(fitted: Fitted) -> tuple[Array, Array]:
 def _drifts(session: Session, fitted: Fitted) -> list[float]:
     """Falls of the sum of squares with a drift of both biases, for each course."""
     inverse = np.linalg.inv(scale_matrix(fitted.values))
-    falls = []
-    for _, course in courses(session.observations):
-        columns = fitted.whitening @ np.kron(course[:, None], inverse)
-        columns = columns - fitted.span @ (fitted.span.T @ columns)
-        values, vectors = np.linalg.eigh(columns.T @ columns)
-        seen = values > _SINGULAR * max(float(values[-1]), np.finfo(float).tiny)
-        along = vectors.T @ (columns.T @ fitted.rest)
-        falls.append(float(np.sum(along[seen] ** 2 / values[seen])))
-    return falls
+    columns = _dense(fitted.whitening) @ np.kron(courses(session.observations)[..., None], inverse)
+    columns = columns - fitted.span @ (fitted.span.T @ columns)
+    values, vectors = np.linalg.eigh(np.swapaxes(columns, 1, 2) @ columns)
+    seen = values > _SINGULAR * np.maximum(values[:, -1:], np.finfo(float).tiny)
+    along = np.vecmat(np.vecmat(fitted.rest, columns), vectors) ** 2
+    falls = np.sum(np.where(seen, along / np.where(seen, values, 1.0), 0.0), axis=1)
+    return [float(fall) for fall in falls]
+
+
+def _dense(whitening: Array) -> Array:
+    """Blocks (n, 2, 2) as one matrix (2n, 2n)."""
+    if whitening.ndim == 2:
+        return whitening
+    n = len(whitening)
+    dense = np.zeros((n, 2, n, 2))
+    dense[np.arange(n), :, np.arange(n), :] = whitening
+    return dense.reshape(2 * n, 2 * n)
 
 
 def _chance(session: Session, fall: float, free: int) -> float:
