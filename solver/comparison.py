@@ -103,22 +103,22 @@ def _words(verdict: Verdict, names: str, worst: float, digits: int, percent: flo
         return Message(
             "first-order-confirmed",
             "First-order propagation (GUM) and Monte Carlo agree: the ends of every %(level)g %% interval are "
-            "the same within the tolerance for %(digits)d significant digits of u (JCGM 101, 8.1).",
+            "the same within the tolerance of JCGM 101 (8.1; significant digits of u: %(digits)d).",
             common,
         )
     if verdict == "disagree":
         return Message(
             "first-order-refuted",
-            "First-order propagation (GUM) and Monte Carlo disagree for %(names)s: ends of the %(level)g %% "
-            "intervals differ by up to %(worst).3g times the tolerance for %(digits)d significant digits of u "
-            "(JCGM 101, 8.1). Use the Monte Carlo intervals.",
+            "First-order propagation (GUM) and Monte Carlo disagree for %(names)s: the ends of the %(level)g %% "
+            "intervals differ by up to %(worst).3g times the tolerance of JCGM 101 (8.1; significant digits of u: "
+            "%(digits)d). Use the Monte Carlo intervals.",
             common,
         )
     return Message(
         "first-order-open",
-        "Whether first-order propagation (GUM) is good enough for %(names)s remains open after %(trials)d draws: "
-        "ends of the %(level)g %% intervals differ by up to %(worst).3g times the tolerance for %(digits)d "
-        "significant digits of u, and those of Monte Carlo are not known better. Draw more, or ask for "
-        "fewer digits.",
+        "Whether first-order propagation (GUM) is good enough for %(names)s is open after %(trials)d draws: "
+        "the ends of the %(level)g %% intervals differ by up to %(worst).3g times the tolerance of JCGM 101 (8.1; "
+        "significant digits of u: %(digits)d), and Monte Carlo does not know its own any better. Draw more, or "
+        "ask for fewer digits.",
         common,
     )
