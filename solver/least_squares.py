@@ -200,7 +200,7 @@ def _solve_block(design: Array, right_side: Array, start: Array, values: Array, 
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a deficient design is doubtful
         unscale = 1.0 / np.sqrt(np.einsum("iib->ib", normal))
         normal *= unscale[:, None] * unscale
-        _invert(normal)
+        invert_symmetric(normal)
         variances = np.einsum("iib->ib", normal)
         # Scaled variances are at least 1; less is the rounding of a singular matrix.
         kappa = np.where(variances.min(axis=0) > 0.5, np.sqrt(len(start) * variances.sum(axis=0)), np.inf)
@@ -223,7 +223,7 @@ def _length(vectors: Array) -> Array:
     return np.asarray(np.sqrt(np.einsum("ib,ib->b", vectors, vectors)))
 
 
-def _invert(stack: Array) -> None:
+def invert_symmetric(stack: Array) -> None:
     """Invert symmetric positive definite matrices, (p, p, B), in place."""
     product = np.empty_like(stack)
     for k in range(len(stack)):

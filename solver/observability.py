@@ -159,8 +159,13 @@ def _hidden_currents(currents: Array, noise: Array, basis: Array | None, scale: 
     unit = np.asarray(np.linalg.inv(np.linalg.cholesky(_noise_gram(noise, basis))) * scale[:4], np.float64)
     _, in_noise, w = _small_svd(_triangle(currents @ unit.T))
     count = len(currents)
-    buried = w[in_noise < max(CLEAR_OF_NOISE, _SHRUNK_BY_U * (count - 8) / np.sqrt(count))]
+    buried = w[in_noise < visible_from(count)]
     return buried @ unit if len(buried) >= len(rounded) else rounded
+
+
+def visible_from(count: int) -> float:
+    """Singular value, in units of what noise alone gives, from which on a direction shows in `count` equations."""
+    return float(max(CLEAR_OF_NOISE, _SHRUNK_BY_U * (count - 8) / np.sqrt(count)))
 
 
 def _noise_gram(noise: Array, basis: Array | None) -> Array:

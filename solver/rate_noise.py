@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.error_model import Equations, rate_covariance, scale_matrix
 from solver.inputs import CommonUncertainty, Inputs, inputs_of
@@ -155,11 +156,17 @@ def whitening_of(values: Array, u_currents: Array) -> Array | None:
 
 def inverse_scale(values: Array) -> Array | None:
     """K⁻¹, (2, 2), A·s/rad; None where K is singular."""
+    if not is_regular(values):
+        return None
     k = scale_matrix(values)
     determinant = k[0, 0] * k[1, 1] - k[0, 1] * k[1, 0]
-    if not abs(determinant) > _SINGULAR * float(np.sum(k * k)):
-        return None
     return np.asarray(np.array([[k[1, 1], -k[0, 1]], [-k[1, 0], k[0, 0]]]) / determinant)
+
+
+def is_regular(values: Array) -> NDArray[np.bool_]:
+    """Whether K of parameters (8, …) can be inverted without losing its digits, (…)."""
+    kx, ky, kxy, kyx = values[:4]
+    return np.asarray(np.abs(kx * ky - kxy * kyx) > _SINGULAR * (kx * kx + ky * ky + kxy * kxy + kyx * kyx))
 
 
 def whiten(whitening: Array, rows: Array, *, transpose: bool = False) -> Array:
