@@ -2,7 +2,7 @@
 
 First order propagates the covariance of the inputs around one point; here the inputs are drawn,
 orientations rotated truly and the parameters solved for, with the weights that the estimate had
-(`solver.draws`, `solver.draw_solutions`). The weights stay: they are part of how the estimate was made.
+(`solver.input_draws`, `solver.draw_solutions`). The weights stay: they are part of how the estimate was made.
 For the robust method these are Huber's, with the inputs' uncertainty widened as its own is.
 """
 

@@ -25,10 +25,10 @@ from typing import Final
 
 import numpy as np
 
-from solver.draws import Drawn, InputDraws, input_draws
 from solver.error_model import design_matrix
 from solver.errors import InputError, Message, SolverError
 from solver.geometry import elements_of
+from solver.input_draws import Drawn, InputDraws, input_draws
 from solver.inputs import CommonUncertainty
 from solver.records import PARAMETERS, Array, Observations
 
@@ -96,7 +96,7 @@ def session_model(
     values : (8,) array
         The estimate.
     common, u_currents, scatter, inflation
-        The uncertain inputs: see `solver.draws.input_draws`.
+        The uncertain inputs: see `solver.input_draws.input_draws`.
     whitening : (n, 2, 2) or (2n, 2n) array, optional
         W of least squares, by position or whole: rows that W multiplies have unit variance. Without
         it every equation has the same weight.

@@ -19,7 +19,7 @@ from solver.records import PARAMETERS
 from solver.robust import robust
 from tests.solver.sessions import DEG_PER_H, LAB, Setup, grid, to_case, truth
 from tests.solver.test_budget import ARCSEC, COEFFICIENTS, EVERYTHING, session
-from tests.solver.test_draws import EARTH, back
+from tests.solver.test_input_draws import EARTH, back
 
 CORRELATED = {("azimuth", "latitude"): 0.9, ("gain_x", "gain_y"): 0.8, ("alpha", "level_1"): -0.7}
 LARGE_COMMON = {

@@ -8,16 +8,16 @@ import pytest
 from solver import draw_solutions, successive
 from solver.calibrate import calibrate
 from solver.draw_solutions import session_model
-from solver.draws import Errors
 from solver.error_model import design_matrix, observation_equations, right_side
 from solver.errors import InputError, SolverError
 from solver.geometry import base, case_orientation, elements
+from solver.input_draws import Errors
 from solver.inputs import COMMON, CommonUncertainty
 from solver.least_squares import solve
 from solver.rate_noise import root_inverse, whitening_of
 from tests.solver.sessions import grid
 from tests.solver.test_budget import COEFFICIENTS, session
-from tests.solver.test_draws import EARTH, everything
+from tests.solver.test_input_draws import EARTH, everything
 
 
 def single(at, common, errors, draw, values):

@@ -5,8 +5,8 @@ import pytest
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
-from solver.draws import Errors, input_draws
 from solver.error_model import scale_matrix
+from solver.input_draws import Errors, input_draws
 from solver.inputs import COMMON, CommonUncertainty, inputs_of
 from tests.solver.sessions import DEG_PER_H, Setup, truth
 from tests.solver.test_budget import ARCSEC, COEFFICIENTS, EVERYTHING, session
