@@ -185,25 +185,44 @@ def inputs_of(
         currents are left out.
     """
     at = observations
-    parts = []
+    source: list[str] = []
+    columns, variances, dof = [], [], []
+
+    def add(lines: list[str], sensitivity: Array, u: Array, freedom: Array) -> None:
+        source.extend(lines)
+        columns.append(sensitivity)
+        variances.append(u**2)
+        dof.append(freedom)
+
     if u_currents is None and at.u_jx is not None and at.u_jy is not None:
         u_currents = np.stack((at.u_jx, at.u_jy), axis=1)
     if u_currents is not None:
-        freedom = np.stack((at.dof_jx, at.dof_jy), axis=1)
-        parts.append(("currents", by_currents(len(at), parameters), u_currents.ravel(), freedom.ravel()))
-    columns, u = _angles(at, parameters)
-    parts.append(("angles", columns, u, np.full(len(u), np.inf)))
-    common = common or CommonUncertainty()
-    shared = by_common(at, parameters, common)
-    names = [next(line for line, members in SOURCES.items() if name in members) for name in COMMON]
-    source = np.array([line for line, _, u, _ in parts for _ in u] + names)
-    sensitivity = np.hstack([columns for _, columns, _, _ in parts] + [shared])
-    variances = np.concatenate([u for _, _, u, _ in parts] + [common.standard]) ** 2
-    covariance = np.diag(variances)
-    covariance[-len(COMMON) :, -len(COMMON) :] = common.covariance
-    dof = np.concatenate([freedom for _, _, _, freedom in parts] + [common.dof])
-    used = variances > 0
-    return Inputs(source[used], sensitivity[:, used], covariance[np.ix_(used, used)], dof[used])
+        freedom = np.stack((at.dof_jx, at.dof_jy), axis=1).ravel()
+        add(["currents"] * len(freedom), by_currents(len(at), parameters), u_currents.ravel(), freedom)
+    if at.u_alpha.any() or at.u_beta.any() or at.u_gamma.any():
+        sensitivity, u = _angles(at, parameters)
+        add(["angles"] * len(u), sensitivity, u, np.full(len(u), np.inf))
+    shared = common is not None and bool(common.standard.any())
+    if common is not None and shared:
+        add([_line(name) for name in COMMON], by_common(at, parameters, common), common.standard, common.dof)
+    if not source:
+        return Inputs(np.array([], dtype=str), np.zeros((2 * len(at), 0)), np.zeros((0, 0)), np.zeros(0))
+    every = np.concatenate(variances)
+    covariance = np.diag(every)
+    if common is not None and shared:
+        covariance[-len(COMMON) :, -len(COMMON) :] = common.covariance
+    used = every > 0
+    return Inputs(
+        np.array(source)[used],
+        np.hstack(columns)[:, used],
+        covariance[np.ix_(used, used)],
+        np.concatenate(dof)[used],
+    )
+
+
+def _line(name: str) -> str:
+    """Line of the budget that a common input belongs to."""
+    return next(line for line, members in SOURCES.items() if name in members)
 
 
 def by_currents(count: int, parameters: Array) -> Array:
