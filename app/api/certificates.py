@@ -9,12 +9,13 @@ from app.api import links
 from app.api.auth import Reader, Uploader
 from app.api.bodies import WholeBody, body_of, filename, is_json, missing, parsed
 from app.api.pagination import CSV_TOO, Columns, Listing, Part, cut, listed, wants_csv
-from app.api.schemas.common import Day, Incoming, Name, Text
+from app.api.schemas.common import Day, Incoming, Name, QueryNotNegative, Text
 from app.api.schemas.equipment import Certificate, CertificateHead, CertificateRead, NewCertificate
 from app.api.schemas.warned import Warned, warned
 from app.exchange.certificate import read_certificate, write_certificate_csv
 from app.exchange.rows import CertificateRow
 from app.services import stands
+from app.services.views import CommonAngles
 
 router = APIRouter(tags=["stands"])
 
@@ -25,6 +26,9 @@ _COLUMNS: Final[Columns[CertificateHead]] = {
     "valid_until": lambda item: item.valid_until.isoformat(),
     "valid": lambda item: "yes" if item.valid else "no",
     "issued_by": lambda item: item.issued_by,
+    "u_alpha_common_arcsec": lambda item: item.u_alpha_common_arcsec,
+    "u_beta_common_arcsec": lambda item: item.u_beta_common_arcsec,
+    "u_gamma_common_arcsec": lambda item: item.u_gamma_common_arcsec,
     "digest": lambda item: item.digest,
     "created_at": lambda item: item.created_at,
     "created_by": lambda item: item.created_by,
@@ -38,6 +42,9 @@ class Heading(Incoming):
     valid_from: Day | None = None
     valid_until: Day | None = None
     issued_by: Text = ""
+    u_alpha_common_arcsec: QueryNotNegative | None = None
+    u_beta_common_arcsec: QueryNotNegative | None = None
+    u_gamma_common_arcsec: QueryNotNegative | None = None
     filename: Name | None = None
 
 
@@ -58,9 +65,10 @@ def add(
     """Keep a certificate: JSON, or the file with number, valid_from and valid_until in the query."""
     new, warnings = _from_json(body) if is_json(request) else _from_file(body, heading, request)
     rows = [CertificateRow(**item.model_dump()) for item in new.positions]
+    common = CommonAngles(*(getattr(new, key) for key in CommonAngles._fields))
     with caller.write() as work:
         made = stands.add_certificate(
-            work, name, new.number, new.valid_from, new.valid_until, rows, new.issued_by
+            work, name, new.number, new.valid_from, new.valid_until, rows, new.issued_by, common
         )
     response.headers["location"] = links.certificate(made.stand, made.number)
     shown = Certificate.model_validate(made)

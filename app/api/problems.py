@@ -118,6 +118,8 @@ def _placed(item: Problem, *, json_body: bool) -> Json:
         return error
     if not json_body:
         return {**error, "parameter": item.column}
+    if item.column.startswith("/"):
+        return {**error, "pointer": _fragment(item.column)}
     # The only rows of a JSON body are those of its list of positions.
     path: list[int | str] = [item.column] if item.row is None else ["positions", item.row - 1, item.column]
     return {**error, "pointer": _pointer(path)}
@@ -137,8 +139,12 @@ def _location(place: tuple[int | str, ...]) -> Json:
 
 def _pointer(path: Iterable[int | str]) -> str:
     steps = (str(step).replace("~", "~0").replace("/", "~1") for step in path)
+    return _fragment("".join(f"/{step}" for step in steps))
+
+
+def _fragment(pointer: str) -> str:
     # JSON can write half a surrogate pair, UTF-8 cannot.
-    return "#" + "".join(f"/{step}" for step in steps).encode("utf-8", "replace").decode()
+    return "#" + pointer.encode("utf-8", "replace").decode()
 
 
 def _sentence(error: Json) -> str:

@@ -9,6 +9,7 @@ from app.api.auth import Reader, Uploader
 from app.api.pagination import CSV_TOO, Columns, Listing, Part, cut, listed
 from app.api.schemas.common import Name
 from app.api.schemas.equipment import NewStand, Stand
+from app.api.schemas.uncertainty import Uncertainty
 from app.services import stands
 
 router = APIRouter(tags=["stands"])
@@ -47,3 +48,13 @@ def detail(name: Name, caller: Reader) -> Stand:
     """One stand."""
     with caller.read() as work:
         return Stand.model_validate(stands.stand(work, name))
+
+
+@router.put("/stands/{name}/uncertainty", responses={404: {}})
+def state_uncertainty(name: Name, body: Uncertainty, caller: Uploader) -> Stand:
+    """State what all positions measured on a stand have in common; an empty object clears it.
+
+    Results that are there already keep what they were computed with.
+    """
+    with caller.write() as work:
+        return Stand.model_validate(stands.state_uncertainty(work, name, body.root))

@@ -9,15 +9,19 @@ import typer
 
 from app.errors import Conflict, Invalid, problem
 from app.exchange.archive import save
+from app.exchange.json_values import dumps
 from app.exchange.numbers import typed
 from app.exchange.rows import Facts
 from app.exchange.session_writing import session_files
-from app.services.simulated import certificate_lab, records_lab, truth_values
+from app.services.simulated import certificate_lab, common_lab, records_lab, truth_values
 from simdevice.bench import Bench, run_session
 from simdevice.certificate import Position, sixteen_positions
 from simdevice.noise import RateNoise
 from simdevice.scenarios import SCENARIOS
 from solver.units import rad_from_deg, rad_per_s_from_deg_per_h
+
+_UNCERTAINTIES = "uncertainties.json"
+"""What the certificate's angles have in common, for `driftbook solve --uncertainties`."""
 
 
 class Format(StrEnum):
@@ -62,6 +66,9 @@ def simulate(
         truth=truth_values(bench.gyro),
         record_format=file_format.value,
     )
+    common = {key: value for key, value in common_lab(bench.stand.certificate)._asdict().items() if value}
+    if common:
+        files[_UNCERTAINTIES] = (dumps(common, indent=1) + "\n").encode()
     save(files, out)
     typer.echo(f"{len(session.positions)} positions in {out}")
 

@@ -121,5 +121,6 @@ class Reader:
         return None
 
     def wrong(self, key: str, message: Message) -> None:
-        """Note a problem of one key."""
-        self._problems.note(message, column=f"{self._pointer}/{key}")
+        """Note a problem of one key, escaped as RFC 6901 has it."""
+        step = key.replace("~", "~0").replace("/", "~1")
+        self._problems.note(message, column=f"{self._pointer}/{step}")

@@ -25,8 +25,11 @@ _PPM: Final = 1e-6
 _ARCSEC: Final = units.rad_from_arcsec(1.0)
 _MA: Final = units.ampere_from_ma(1.0)
 _FURTHER: Final = ("correlations", "dof", "temperature_coefficients")
-_LARGEST: Final = 1e9
-_FEWEST_DOF: Final = 1e-3
+LARGEST: Final = 1e9
+"""Of every number of a statement."""
+
+FEWEST_DOF: Final = 1e-3
+"""Degrees of freedom are greater than nothing."""
 
 UNCERTAINTY_KEYS: Final[Mapping[str, tuple[str, float]]] = {
     "u_gain_x_ppm": ("gain_x", _PPM),
@@ -80,11 +83,11 @@ def common_uncertainty(statement: Statement, filename: str | None = None) -> Com
             )
     standard = {}
     for key, (name, factor) in UNCERTAINTY_KEYS.items():
-        value = reader.number(key, 0.0, _LARGEST)
+        value = reader.number(key, 0.0, LARGEST)
         if value is not None:
             standard[name] = value * factor
     correlation = _correlations(statement, reader, problems)
-    dof = _numbers(statement, "dof", COMMON, reader, problems, smallest=_FEWEST_DOF)
+    dof = _numbers(statement, "dof", COMMON, reader, problems, smallest=FEWEST_DOF)
     coefficients = _numbers(statement, "temperature_coefficients", PARAMETERS, reader, problems)
     problems.raise_if_any()
     try:
@@ -98,23 +101,52 @@ def common_uncertainty(statement: Statement, filename: str | None = None) -> Com
         raise Invalid(Problem(error.message, file=filename)) from error
 
 
+def tidy(statement: Statement) -> dict[str, Any]:
+    """The statement in the order of its keys, without what says nothing: null, an empty list or object."""
+    return {
+        key: statement[key]
+        for key in (*UNCERTAINTY_KEYS, *_FURTHER)
+        if statement.get(key) not in (None, [], {})
+    }
+
+
 def _correlations(statement: Statement, reader: Reader, problems: Problems) -> dict[tuple[str, str], float]:
-    listed = statement.get("correlations", [])
+    listed = statement.get("correlations")
+    if listed is None:
+        return {}
     if not isinstance(listed, list):
         reader.wrong("correlations", _not_a_correlation())
         return {}
-    found = {}
+    found: dict[tuple[str, str], float] = {}
+    inner = Reader({}, problems, "/correlations")
     for number, entry in enumerate(listed):
-        pair = entry.get("between") if isinstance(entry, dict) else None
-        if not (
-            isinstance(pair, list) and len(pair) == 2 and pair[0] != pair[1] and set(pair) <= set(COMMON)
-        ):
-            reader.wrong(f"correlations/{number}", _not_a_correlation())
+        pair = _pair(entry)
+        if pair is None:
+            inner.wrong(str(number), _not_a_correlation())
+            continue
+        if found.keys() & {pair, pair[::-1]}:
+            inner.wrong(
+                str(number),
+                Message("repeated-correlation", "The correlation of %(one)s and %(other)s stands there already. "
+                        "Keep one of the two.", {"one": pair[0], "other": pair[1]}),
+            )  # fmt: skip
             continue
         value = Reader(entry, problems, f"/correlations/{number}").number("coefficient", -1.0, 1.0)
         if value is not None:
-            found[(pair[0], pair[1])] = value
+            found[pair] = value
     return found
+
+
+def _pair(entry: Any) -> tuple[str, str] | None:
+    """The two inputs that an entry correlates; None when it is not written as it must be."""
+    if not isinstance(entry, dict) or entry.keys() != {"between", "coefficient"}:
+        return None
+    pair = entry["between"]
+    if not isinstance(pair, list) or len(pair) != 2 or entry["coefficient"] is None:
+        return None
+    one, other = pair
+    known = one in COMMON and other in COMMON  # a tuple compares, so that lists and objects are no error
+    return (one, other) if known and one != other else None
 
 
 def _not_a_correlation() -> Message:
@@ -131,10 +163,12 @@ def _numbers(
     names: tuple[str, ...],
     reader: Reader,
     problems: Problems,
-    smallest: float = -_LARGEST,
+    smallest: float = -LARGEST,
 ) -> dict[str, float]:
     """An object of numbers by name, each name one of `names`."""
-    listed = statement.get(key, {})
+    listed = statement.get(key)
+    if listed is None:
+        return {}
     if not isinstance(listed, dict):
         reader.wrong(
             key, Message("not-an-object", "This must be an object of numbers by name, in braces { }.")
@@ -153,7 +187,7 @@ def _numbers(
                 ),
             )
             continue
-        value = inner.number(name, smallest, _LARGEST)
+        value = inner.number(name, smallest, LARGEST)
         if value is not None:
             found[name] = value
     return found

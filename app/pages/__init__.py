@@ -2,7 +2,8 @@
 
 Addresses: ``/`` today · ``/sessions`` ``/sessions/new`` ``/sessions/{id}`` · ``/results``
 ``/results/{id}`` · ``/measurements/{id}`` · ``/gyros`` ``/gyros/{serial}`` (its history)
-``/gyros/{serial}/edit`` · ``/types/{name}`` · ``/stands`` ``/stands/{name}`` · ``/certificates``
+``/gyros/{serial}/edit`` · ``/types/{name}`` · ``/stands`` ``/stands/{name}``
+``/stands/{name}/plan`` ``/stands/{name}/uncertainty`` · ``/certificates``
 ``/certificates/{stand}/{number}`` · ``/simulations/new`` · ``/jobs/{id}`` · ``/method`` ·
 ``/validation`` ``/validation/{report}``.
 
@@ -25,6 +26,7 @@ from app.pages import (
     jobs,
     measurements,
     method,
+    planning,
     results,
     session_files,
     sessions,
@@ -33,6 +35,7 @@ from app.pages import (
     stands,
     today,
     types,
+    uncertainty,
     validation,
 )
 from app.pages.base import STATIC, Language
@@ -41,8 +44,8 @@ __all__ = ["errors", "mount", "router"]
 
 router = APIRouter(include_in_schema=False)
 for _noun in (
-    today, sessions, session_files, entry, results, measurements, gyros, history, types, stands,
-    certificates, simulations, jobs, method, validation, sign_in, choices, assets,
+    today, sessions, session_files, entry, results, measurements, gyros, history, types, stands, planning,
+    uncertainty, certificates, simulations, jobs, method, validation, sign_in, choices, assets,
 ):  # fmt: skip
     router.include_router(_noun.router)
 

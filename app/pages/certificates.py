@@ -16,11 +16,13 @@ from app.pages.certificate_rows import Cells, Given, Unusable
 from app.pages.forms import Fields, Form, Sent
 from app.services import stands
 from app.services.lab import Lab, Person
-from app.services.views import CertificateView
+from app.services.views import CertificateView, CommonAngles
 
 router = APIRouter()
 
-_FIELDS: Final = ("stand", "number", "valid_from", "valid_until", "issued_by", "pasted", "agreed")
+_FIELDS: Final = (
+    "stand", "number", "valid_from", "valid_until", "issued_by", *CommonAngles._fields, "pasted", "agreed",
+)  # fmt: skip
 
 
 @router.get("/certificates")
@@ -92,13 +94,14 @@ def detail(request: Request, person: Reader, lab: TheLab, stand: str, number: st
     )  # fmt: skip
 
 
-def _head(form: Form) -> tuple[str, str, date, date]:
-    """Number, issuer and validity; `Invalid` with every field that is wrong."""
+def _head(form: Form) -> tuple[str, str, date, date, CommonAngles]:
+    """Number, issuer, validity, and what the angles share; `Invalid` with every field that is wrong."""
     fields = Fields(form)
     number, issued_by = fields.text("number", 60), fields.text("issued_by", 200)
     valid_from, valid_until = fields.day("valid_from"), fields.day("valid_until")
+    common = CommonAngles(*(fields.not_negative(name) for name in CommonAngles._fields))
     fields.check()
-    return number, issued_by, valid_from, valid_until
+    return number, issued_by, valid_from, valid_until, common
 
 
 def _problems_of_head(form: Form) -> Sequence[Problem]:
@@ -110,10 +113,10 @@ def _problems_of_head(form: Form) -> Sequence[Problem]:
 
 
 def _add(lab: Lab, person: Person, form: Form, read: Given) -> CertificateView:
-    number, issued_by, valid_from, valid_until = _head(form)
+    number, issued_by, valid_from, valid_until, common = _head(form)
     with lab.write(person) as work:
         return stands.add_certificate(
-            work, form.value("stand"), number, valid_from, valid_until, read.rows, issued_by
+            work, form.value("stand"), number, valid_from, valid_until, read.rows, issued_by, common
         )
 
 

@@ -77,6 +77,14 @@ def sentence(item: Problem) -> str:
     return f"{where}: {text}" if where else text
 
 
+def negative(name: str, value: float | None) -> list[Problem]:
+    """What to say of a standard uncertainty below zero."""
+    if value is None or not value < 0:
+        return []
+    return [problem("negative-uncertainty", "A standard uncertainty is not negative. Take the sign away.",
+                    column=name)]  # fmt: skip
+
+
 def _text(value: UploadFile | str | None) -> str:
     return value if isinstance(value, str) else ""
 
@@ -95,6 +103,12 @@ class Fields:
     def optional(self, name: str, unit: str) -> float | None:
         """A number, or None for an empty field."""
         return self.number(name, unit) if self._form.value(name).strip() else None
+
+    def not_negative(self, name: str) -> float | None:
+        """A standard uncertainty, or None for an empty field."""
+        value = self.optional(name, "")
+        self.wrong(*negative(name, value))
+        return value
 
     def whole(self, name: str) -> int:
         """A whole number that must be there."""

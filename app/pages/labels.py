@@ -18,7 +18,7 @@ _SYMBOLS: Final = {
     "w0x": ("ω", "0x"), "w0y": ("ω", "0y"), "wg": ("ω", "g"), "wk": ("ω", "k"), "wn": ("ω", "n"),
     "jx": ("J", "x"), "jy": ("J", "y"), "theta": ("θ", ""), "psi": ("ψ", ""),
     "alpha": ("α", ""), "beta": ("β", ""), "gamma": ("γ", ""), "u": ("u", ""), "U": ("U", ""),
-    "k": ("k", ""), "chi2": ("χ", "²"), "p": ("p", ""), "phi": ("φ", ""),
+    "k": ("k", ""), "nu": ("ν", ""), "chi2": ("χ", "²"), "p": ("p", ""), "phi": ("φ", ""),
     "wh": ("ω", "h"), "wv": ("ω", "v"), "nx": ("n", "x"), "ny": ("n", "y"), "nz": ("n", "z"),
 }  # fmt: skip
 _RUSSIAN_INDEX: Final = {"wk": "к", "wn": "н", "wh": "г", "wv": "в"}
@@ -45,7 +45,7 @@ _SUFFIXES: Final = {
 _UNITS: Final = {
     "deg/h/mA": marked("°/h/mA"), "deg/h": marked("°/h"), "deg/h/g": marked("°/h/g"), "mA": marked("mA"),
     "µA": marked("µA"), "nA": marked("nA"), "s": marked("s"), "Hz": marked("Hz"), "arcsec": "″",
-    "deg": "°", "°C": "°C",
+    "deg": "°", "°C": "°C", "ppm": marked("ppm"), "K": marked("K"),
 }  # fmt: skip
 
 _ROLES: Final = {

@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 from fastapi import APIRouter, Request, Response
 
 from app.errors import AppError
+from app.pages import uncertainty_fields
 from app.pages.base import Reader, TheLab, Writer, render, see
 from app.pages.forms import Fields, Form, Sent
 from app.services import sessions, stands
@@ -52,5 +53,5 @@ def detail(request: Request, person: Reader, lab: TheLab, name: str) -> Response
         latest = sessions.sessions(work, stand=name, limit=6).items
     return render(
         request, "stands/detail.html", stand=stand, certificates=certificates, sessions=latest,
-        today=datetime.now(UTC).date(),
+        stated=uncertainty_fields.summary(stand.uncertainty), today=datetime.now(UTC).date(),
     )  # fmt: skip

@@ -1,74 +1,116 @@
-"""Limits of a type of gyro: what its results are judged by."""
+"""A type of gyro: the limits that its results are judged by, and what its gyros are expected to be."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
 
 from fastapi import APIRouter, Request, Response
 
-from app.errors import AppError, NotFound, Problem, problem
+from app.errors import AppError, Invalid, NotFound, Problem, problem
 from app.figures import entered
 from app.pages import labels
 from app.pages.base import Reader, TheLab, Writer, render, see
 from app.pages.forms import Fields, Form, Sent
 from app.services import gyros
 from app.services.lab import Lab, Person
-from app.services.views import TypeView
+from app.services.views import Nominal, TypeView
 from solver.records import PARAMETERS
 
 router = APIRouter()
 
+LIMITS: Final = ("low", "high")
+NOMINAL: Final = ("nominal", "u", "per_kelvin")
+"""Columns of the two tables; a field is one of them and a parameter with its unit: ``low_w0x_deg_per_h``."""
 
-def _field(parameter: str, end: str) -> str:
-    return f"{end}_{labels.field(parameter)}"
+_Limits = Mapping[str, tuple[float, float]]
+_Nominals = Mapping[str, Nominal]
 
 
-_FIELDS: Final = tuple(_field(name, end) for name in PARAMETERS for end in ("low", "high"))
+def _field(parameter: str, column: str) -> str:
+    unit = "_per_k" if column == "per_kelvin" else ""
+    return f"{'temperature' if unit else column}_{labels.field(parameter)}{unit}"
+
+
+_FIELDS: Final = tuple(
+    _field(name, column) for columns in (LIMITS, NOMINAL) for name in PARAMETERS for column in columns
+)
 
 
 @router.get("/types/{name}")
-def limits(request: Request, person: Reader, lab: TheLab, name: str) -> Response:
-    """The limits as they are, in a form for whoever may change them."""
+def detail(request: Request, person: Reader, lab: TheLab, name: str) -> Response:
+    """Limits and nominal values as they are, in a form for whoever may change them."""
     kind = _find(lab, person, name)
+    rows = ((LIMITS, kind.limits), (NOMINAL, kind.nominals))
     values = {
-        _field(parameter, end): entered(value)
-        for parameter, pair in kind.limits.items()
-        for end, value in zip(("low", "high"), pair, strict=True)
+        _field(parameter, column): entered(value)
+        for columns, stated in rows
+        for parameter, given in stated.items()
+        for column, value in zip(columns, given, strict=True)
     }
     return _shown(request, kind, Form(dict.fromkeys(_FIELDS, "") | values))
 
 
 @router.post("/types/{name}")
 def change(request: Request, person: Writer, lab: TheLab, name: str, sent: Sent) -> Response:
-    """Enter limits in place of those before."""
+    """Enter limits and nominal values in place of those before."""
     kind = _find(lab, person, name)
     form = Form.of(sent, *_FIELDS)
     try:
-        entered_limits = _read(form)
-        with lab.write(person) as work:
-            gyros.set_limits(work, name, entered_limits)
+        fields = Fields(form)
+        limits, nominals = _limits(fields), _nominals(fields)
+        fields.check()
+        _keep(lab, person, name, limits, nominals)
     except AppError as error:
-        problems = [_beside_field(item) for item in error.problems]
-        return _shown(request, kind, form.with_problems(*problems), error.status)
+        return _shown(request, kind, form.with_problems(*error.problems), error.status)
     return see("/gyros")
 
 
-def _read(form: Form) -> dict[str, tuple[float, float]]:
-    fields = Fields(form)
+def _keep(lab: Lab, person: Person, name: str, limits: _Limits, nominals: _Nominals) -> None:
+    """Both or neither; `Invalid` with what is wrong with either."""
+    with lab.write(person) as work:
+        problems = [
+            *_refused(lambda: gyros.set_limits(work, name, limits), LIMITS[0]),
+            *_refused(lambda: gyros.set_nominals(work, name, nominals), NOMINAL[1]),
+        ]
+        if problems:
+            raise Invalid(*problems)
+
+
+def _refused(act: Callable[[], None], column: str) -> list[Problem]:
+    """What the service says about a parameter, beside this column of its table."""
+    try:
+        act()
+    except Invalid as error:
+        return [
+            replace(item, column=_field(item.column, column)) if item.column in PARAMETERS else item
+            for item in error.problems
+        ]
+    return []
+
+
+def _limits(fields: Fields) -> _Limits:
     found = {}
     for parameter in PARAMETERS:
-        low, high = (fields.optional(_field(parameter, end), "") for end in ("low", "high"))
+        low, high = (fields.optional(_field(parameter, end), "") for end in LIMITS)
         if low is not None and high is not None:
             found[parameter] = (low, high)
         elif (low is None) != (high is None):
             fields.wrong(problem("half-limit", "Give both limits, or none.",
                                  column=_field(parameter, "low" if low is None else "high")))  # fmt: skip
-    fields.check()
     return found
 
 
-def _beside_field(item: Problem) -> Problem:
-    """What the service says about a parameter stands beside its lower limit."""
-    return replace(item, column=_field(item.column, "low")) if item.column in PARAMETERS else item
+def _nominals(fields: Fields) -> _Nominals:
+    found = {}
+    for parameter in PARAMETERS:
+        value, u, per_kelvin = (fields.optional(_field(parameter, column), "") for column in NOMINAL)
+        if value is not None and u is not None:
+            found[parameter] = Nominal(value, u, per_kelvin)
+        elif (value, u, per_kelvin) != (None, None, None):
+            lacking = "nominal" if value is None else "u"
+            fields.wrong(problem("half-nominal", "Give the nominal value and its standard deviation, or neither.",
+                                 column=_field(parameter, lacking)))  # fmt: skip
+    return found
 
 
 def _find(lab: Lab, person: Person, name: str) -> TypeView:
@@ -81,6 +123,7 @@ def _find(lab: Lab, person: Person, name: str) -> TypeView:
 
 def _shown(request: Request, kind: TypeView, form: Form, status: int = 200) -> Response:
     return render(
-        request, "types/limits.html", status=status, kind=kind, form=form, unit_of=labels.PARAMETER_UNITS,
-        rows=[(name, _field(name, "low"), _field(name, "high")) for name in PARAMETERS],
+        request, "types/detail.html", status=status, kind=kind, form=form, unit_of=labels.PARAMETER_UNITS,
+        limit_rows=[(name, [_field(name, column) for column in LIMITS]) for name in PARAMETERS],
+        nominal_rows=[(name, [_field(name, column) for column in NOMINAL]) for name in PARAMETERS],
     )  # fmt: skip

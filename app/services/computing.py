@@ -42,11 +42,11 @@ def simulate(payload: Mapping[str, Any], report: Report) -> dict[str, Any]:
     certificate = [CertificateRow(**row) for row in payload["certificate"]]
     conditions = Conditions(**payload["conditions"])
     report(0.02, "simulating")
-    truth, records = simulated_records(conditions, certificate, payload["latitude_deg"])
+    stated = Stated(**payload["stated"])
+    truth, records = simulated_records(conditions, certificate, payload["latitude_deg"], stated.uncertainties)
     measured = _kept(files, records, report, until=0.9)
     means = [MeansRow(**item["means"]) for item in measured]
     report(0.92, "solving")
-    stated = Stated(**payload["stated"])
     result = solved(means, certificate, payload["latitude_deg"], payload["method"], stated)
     return {"measured": measured, "truth": truth, **result}
 

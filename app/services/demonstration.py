@@ -15,17 +15,31 @@ import numpy as np
 
 from app.exchange.records import means_row, write_record_parquet
 from app.exchange.rows import CertificateRow, MeansRow
+from app.exchange.si import parameter_lab
+from app.exchange.uncertainties import Statement
 from app.services import access, calibrations, gyros, ingest, stands
 from app.services.calibrations import TRIALS
 from app.services.lab import Lab, Person, Work
 from app.services.sessions import NewSession, find_session, open_session
-from app.services.simulated import certificate_lab, degrees, records_lab, truth_values
+from app.services.simulated import (
+    ammeter_off,
+    certificate_lab,
+    common_lab,
+    degrees,
+    deviations,
+    records_lab,
+    truth_values,
+)
 from app.services.solving import solved
+from app.services.views import Nominal
 from app.store import measurement
+from simdevice.ammeter import Ammeter
 from simdevice.bench import Bench, mean_currents, run_session
 from simdevice.certificate import draw_certificate, sixteen_positions
 from simdevice.fleet import DAY, FleetGyro, demonstration_fleet
+from simdevice.scenarios import LABORATORY_AMMETER, TYPES
 from simdevice.stand import Stand
+from solver.records import PARAMETERS
 from solver.units import ma_from_ampere, rad_from_deg
 
 SEED: Final = 2026
@@ -41,6 +55,17 @@ _LIMITS: Final = {
     "DTG-4": {"kx": (790.0, 860.0), "ky": (790.0, 870.0), "kxy": (-20.0, 20.0), "kyx": (-20.0, 20.0),
               "w0x": (-14.0, 14.0), "w0y": (-14.0, 14.0), "wg": (-25.0, 25.0), "wk": (-12.0, 12.0)},
 }  # fmt: skip
+_UNCERTAINTY: Final[Statement] = {
+    "u_gain_x_ppm": 20, "u_gain_y_ppm": 20, "u_offset_x_ma": 5e-7, "u_offset_y_ma": 5e-7,
+    "u_level_1_arcsec": 2, "u_level_2_arcsec": 2, "u_azimuth_arcsec": 10, "u_latitude_arcsec": 1,
+    "u_gravity_ppm": 5, "u_temperature_k": 0.3,
+    "correlations": [{"between": ["gain_x", "gain_y"], "coefficient": 0.9}], "dof": {"azimuth": 8},
+}  # fmt: skip
+"""Of stand S1; what is uncertain here really deviates, by an amount drawn from it."""
+_PER_KELVIN: Final = {
+    "GVK-6": {"kx": -0.4, "ky": -0.4, "w0x": 0.004, "w0y": 0.004},
+    "DTG-4": {"kx": -0.17, "ky": -0.17, "w0x": 0.01, "w0y": 0.01},
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +89,7 @@ def build(lab: Lab, now: datetime | None = None) -> None:
         fleet = demonstration_fleet(SEED)
         for kind, limits in _LIMITS.items():
             gyros.set_limits(work, kind, limits)
+            gyros.set_nominals(work, kind, _nominals(kind))
         for item in fleet:
             gyros.add_gyro(work, item.serial, item.kind.name)
         certified = _equip(work, now)
@@ -72,10 +98,27 @@ def build(lab: Lab, now: datetime | None = None) -> None:
         _leave_one_open(work, fleet[2], certified[-1][1], certified[-1][2], now)
 
 
+def _nominals(kind: str) -> dict[str, Nominal]:
+    """What the simulated type's gyros are drawn from, as a laboratory would round it."""
+    made = TYPES[kind]
+    return {
+        name: Nominal(
+            round(parameter_lab(name, getattr(made.nominal, name)), 2),
+            float(f"{parameter_lab(name, made.spread[name]):.2g}"),
+            _PER_KELVIN[kind].get(name),
+        )
+        for name in PARAMETERS
+    }
+
+
 def _equip(work: Work, now: datetime) -> list[tuple[datetime, Stand, list[CertificateRow]]]:
     """Stand S1 with two successive certificates; each as (valid from, true stand, rows)."""
-    first = Stand(rad_from_deg(LATITUDE_DEG), draw_certificate(SEED), seed=SEED)
+    off = deviations(SEED, _UNCERTAINTY)
+    base = (off["level_1"], off["level_2"], off["azimuth"])
+    latitude = rad_from_deg(LATITUDE_DEG) + off["latitude"]
+    first = Stand(latitude, draw_certificate(SEED), base, seed=SEED)
     stands.add_stand(work, "S1", LATITUDE_DEG, "Room 12, pier 1")
+    stands.state_uncertainty(work, "S1", _UNCERTAINTY)
     certified = []
     for number, stand, begin in (
         ("C-16", first, now - timedelta(days=500)),
@@ -83,7 +126,16 @@ def _equip(work: Work, now: datetime) -> list[tuple[datetime, Stand, list[Certif
     ):
         rows = certificate_lab(stand.certificate)
         end = (begin + timedelta(days=365)).date()
-        stands.add_certificate(work, "S1", number, begin.date(), end, rows, "Regional metrology centre")
+        stands.add_certificate(
+            work,
+            "S1",
+            number,
+            begin.date(),
+            end,
+            rows,
+            "Regional metrology centre",
+            common_lab(stand.certificate),
+        )
         certified.append((begin, stand, rows))
     return certified
 
@@ -93,6 +145,10 @@ def _stand_at(
 ) -> tuple[Stand, list[CertificateRow]]:
     _, stand, rows = [item for item in certified if item[0].date() <= at.date()][-1]
     return stand, rows
+
+
+def _ammeter() -> Ammeter:
+    return ammeter_off(LABORATORY_AMMETER, deviations(SEED, _UNCERTAINTY))
 
 
 def _visits(fleet: Sequence[FleetGyro], now: datetime) -> Iterator[_Visit]:
@@ -113,7 +169,7 @@ def _visits(fleet: Sequence[FleetGyro], now: datetime) -> Iterator[_Visit]:
 def _measure(work: Work, visit: _Visit, stand: Stand, rows: Sequence[CertificateRow]) -> None:
     work.now = visit.at + timedelta(minutes=43)
     work.person = Person("petrova", "I. Petrova", "technician", frozenset())
-    bench = visit.gyro.bench(stand, visit.time, visit.start, visit.number)
+    bench = visit.gyro.bench(stand, visit.time, visit.start, visit.number, _ammeter())
     new_start = visit.start > gyros.starts(work, visit.gyro.serial)
     session = open_session(
         work,
@@ -171,7 +227,7 @@ def _leave_one_open(
     session = open_session(
         work, NewSession(gyro.serial, "S1", started_at=begun, new_start=True, temperature_c=21.6)
     )
-    bench = gyro.bench(stand, 365 * DAY, 99, 99)
+    bench = gyro.bench(stand, 365 * DAY, 99, 99, _ammeter())
     for row in _means(bench, begun)[:12]:
         work.now = row.started_at or begun
         typed = replace(row, jx_ma=round(row.jx_ma, 7), jy_ma=round(row.jy_ma, 7), u_jx_ma=None, u_jy_ma=None)

@@ -73,7 +73,8 @@ def set_limits(work: Work, type_name: str, limits: Mapping[str, tuple[float, flo
     """Enter a type's limits, in laboratory units; they replace the ones before."""
     for parameter, (low, high) in limits.items():
         if parameter not in PARAMETERS:
-            raise Invalid(problem("unknown-parameter", "There is no parameter “%(name)s”.", name=parameter))
+            raise Invalid(problem("unknown-parameter", "There is no parameter “%(name)s”.",
+                                  column=parameter, name=parameter))  # fmt: skip
         if not low < high:
             raise Invalid(
                 problem("bad-limit", "The lower limit must be below the upper one.", column=parameter)
@@ -95,7 +96,8 @@ def set_nominals(work: Work, type_name: str, nominals: Mapping[str, Nominal]) ->
     """
     for parameter, nominal in nominals.items():
         if parameter not in PARAMETERS:
-            raise Invalid(problem("unknown-parameter", "There is no parameter “%(name)s”.", name=parameter))
+            raise Invalid(problem("unknown-parameter", "There is no parameter “%(name)s”.",
+                                  column=parameter, name=parameter))  # fmt: skip
         if not nominal.u > 0:
             raise Invalid(problem("bad-uncertainty", "The standard uncertainty of a nominal value must be "
                                   "greater than zero.", column=parameter))  # fmt: skip

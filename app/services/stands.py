@@ -11,7 +11,7 @@ from app.exchange.certificate import write_certificate_csv
 from app.exchange.fields import full_turn
 from app.exchange.positions import Positions
 from app.exchange.rows import CertificateRow
-from app.exchange.uncertainties import Statement, common_uncertainty
+from app.exchange.uncertainties import Statement, common_uncertainty, tidy
 from app.services.lab import Work
 from app.services.names import checked_name
 from app.services.views import NONE_IN_COMMON, CertificateView, CommonAngles, StandView
@@ -57,7 +57,7 @@ def state_uncertainty(work: Work, name: str, statement: Statement) -> StandView:
     """
     common_uncertainty(statement)
     row = find_stand(work, name)
-    row.uncertainty = dict(statement) or None
+    row.uncertainty = tidy(statement) or None
     work.db.flush()
     return _stand_view(work, row)
 
@@ -79,7 +79,8 @@ def add_certificate(
     Raises
     ------
     Invalid
-        No position, one position twice, a validity that ends before it begins.
+        No position, one position twice, a validity that ends before it begins, an uncertainty in
+        common that is negative or beyond reason.
     Conflict
         The stand has a certificate of that number.
     """
@@ -87,6 +88,7 @@ def add_certificate(
     number = checked_name(number, "number")
     if valid_until < valid_from:
         raise Invalid(problem("bad-validity", "The certificate ends before it begins.", column="valid_until"))
+    _check_common(common)
     if not rows:
         raise Invalid(
             problem("no-positions", "A certificate needs at least one position.", column="positions")
@@ -106,6 +108,15 @@ def add_certificate(
     work.db.add(certificate)
     work.db.flush()
     return certificate_view(certificate, work.now.date())
+
+
+def _check_common(common: CommonAngles) -> None:
+    try:
+        common_uncertainty(common._asdict())
+    except Invalid as error:
+        raise Invalid(
+            *(replace(item, column=(item.column or "").lstrip("/")) for item in error.problems)
+        ) from error
 
 
 def _in_one_turn(rows: Sequence[CertificateRow]) -> list[CertificateRow]:

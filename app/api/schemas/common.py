@@ -62,6 +62,9 @@ Number = Annotated[float, Field(strict=True)]
 
 Positive = Annotated[float, Field(strict=True, gt=0)]
 NotNegative = Annotated[float, Field(strict=True, ge=0)]
+QueryNotNegative = Annotated[float, Field(ge=0)]
+"""The same in a query, where everything is text."""
+
 Angle = Annotated[float, Field(strict=True, ge=-720, le=720)]
 PathAngle = Annotated[float, Field(ge=-720, le=720, allow_inf_nan=False)]
 Name = Annotated[str, StringConstraints(min_length=1, max_length=100, pattern=r"^[^\x00]*$")]

@@ -1,16 +1,30 @@
 """Gyros, types, stands and certificates."""
 
 from datetime import date, datetime
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import ConfigDict, Field
+from pydantic import AliasPath, ConfigDict, Field
 from pydantic.config import JsonDict
 
-from app.api.schemas.common import Angle, Day, Incoming, Name, NotNegative, Number, Outgoing, Text
+from app.api.schemas.common import (
+    Angle,
+    Day,
+    Incoming,
+    Name,
+    NotNegative,
+    Number,
+    Outgoing,
+    Positive,
+    Text,
+)
 from app.api.schemas.results import Summary
+from app.api.schemas.uncertainty import Uncertainty
 from app.api.schemas.warned import Warned
 
 _SOME_LIMITS: JsonDict = {"limits": {"wg": {"low": -3.0, "high": 3.0}}}
+_SOME_NOMINALS: JsonDict = {
+    "nominals": {"kx": {"value": 2063.0, "standard_uncertainty": 21.0, "per_kelvin": -0.4}}
+}
 
 
 class NewGyro(Incoming):
@@ -97,11 +111,21 @@ class NewCertificate(Incoming):
     valid_from: Day
     valid_until: Day
     issued_by: Text = ""
+    u_alpha_common_arcsec: NotNegative | None = None
+    u_beta_common_arcsec: NotNegative | None = None
+    u_gamma_common_arcsec: NotNegative | None = None
     positions: Annotated[list[CertificatePosition], Field(min_length=1, max_length=10_000)]
 
 
+def _in_common(name: str) -> Any:
+    return Field(validation_alias=AliasPath("common", name))
+
+
 class CertificateHead(Outgoing):
-    """A version of a stand's certificate; `valid` says whether it is valid today."""
+    """A version of a stand's certificate; `valid` says whether it is valid today.
+
+    `u_alpha_common_arcsec` and its like: standard uncertainty of what the angles of all positions share.
+    """
 
     stand: str
     number: str
@@ -110,6 +134,9 @@ class CertificateHead(Outgoing):
     valid_until: date
     valid: bool
     issued_by: str
+    u_alpha_common_arcsec: Annotated[float | None, _in_common("u_alpha_common_arcsec")]
+    u_beta_common_arcsec: Annotated[float | None, _in_common("u_beta_common_arcsec")]
+    u_gamma_common_arcsec: Annotated[float | None, _in_common("u_gamma_common_arcsec")]
     digest: str
     created_at: datetime
     created_by: str
@@ -128,13 +155,14 @@ class CertificateRead(Certificate):
 
 
 class Stand(Outgoing):
-    """A stand, and the certificate that is valid today."""
+    """A stand, the certificate that is valid today, and what is stated of its uncertainty."""
 
     name: str
     latitude_deg: float
     note: str
     created_at: datetime
     certificate: CertificateHead | None
+    uncertainty: Uncertainty
 
 
 class Limit(Incoming):
@@ -152,10 +180,31 @@ class NewLimits(Incoming):
     limits: dict[Name, Limit]
 
 
+class Nominal(Incoming):
+    """What a parameter is expected to be, in its laboratory unit.
+
+    The standard uncertainty is the standard deviation between gyros of the type; `per_kelvin` is the
+    temperature coefficient, null where it is not known.
+    """
+
+    value: Number
+    standard_uncertainty: Positive
+    per_kelvin: Number | None = None
+
+
+class NewNominals(Incoming):
+    """A type's nominal values; they replace the ones before."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_SOME_NOMINALS]})
+
+    nominals: dict[Name, Nominal]
+
+
 class GyroType(Outgoing):
-    """A type of gyro, its limits and how many gyros it has."""
+    """A type of gyro, its limits, its nominal values and how many gyros it has."""
 
     name: str
     note: str
     gyros: int
     limits: dict[str, Limit]
+    nominals: dict[str, Nominal]

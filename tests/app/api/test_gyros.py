@@ -12,7 +12,7 @@ def test_a_gyro_is_registered_with_its_type(client: httpx.Client) -> None:
     assert shown == made.json()
     assert (shown["serial"], shown["type"], shown["last_result"]) == ("0417", "GVK-6", None)
     types = client.get("/types").json()["items"]
-    assert types == [{"name": "GVK-6", "note": "", "gyros": 1, "limits": {}}]
+    assert types == [{"name": "GVK-6", "note": "", "gyros": 1, "limits": {}, "nominals": {}}]
 
 
 def test_a_serial_number_is_registered_once(client: httpx.Client) -> None:
@@ -87,12 +87,14 @@ def test_limits_of_a_type(client: httpx.Client) -> None:
     assert made.json()["limits"] == {"wg": {"low": -3.0, "high": 3.0}}
     replaced = client.put("/types/GVK-6/limits", json={"limits": {"w0x": {"low": -1, "high": 1}}})
     assert list(replaced.json()["limits"]) == ["w0x"]
-    for limits, code in (
-        ({"wz": {"low": 0, "high": 1}}, "unknown-parameter"),
-        ({"wg": {"low": 1, "high": 1}}, "bad-limit"),
+    for limits, code, pointer in (
+        ({"wz": {"low": 0, "high": 1}}, "unknown-parameter", "#/limits/wz"),
+        ({"a/b": {"low": 0, "high": 1}}, "unknown-parameter", "#/limits/a~1b"),
+        ({"wg": {"low": 1, "high": 1}}, "bad-limit", "#/limits/wg"),
     ):
         refused = client.put("/types/GVK-6/limits", json={"limits": limits})
-        assert (refused.status_code, refused.json()["code"]) == (422, code)
+        assert refused.status_code == 422
+        assert [(item["code"], item["pointer"]) for item in refused.json()["errors"]] == [(code, pointer)]
 
 
 def test_history_of_a_gyro_that_was_never_solved(stand: httpx.Client) -> None:

@@ -4,6 +4,7 @@ from typing import Any
 
 import httpx
 import pytest
+from serving import Service
 
 DATES = {"number": "C-18", "valid_from": "2026-01-01", "valid_until": "2027-01-01"}
 POSITION = {"theta_deg": 0, "psi_deg": 90, "alpha_arcsec": 6.9, "beta_arcsec": 16.4, "gamma_arcsec": -6.6}
@@ -113,6 +114,102 @@ def test_angles_are_brought_into_one_turn(stand: httpx.Client) -> None:
     turned = POSITION | {"theta_deg": 360, "psi_deg": -90}
     made = stand.post("/stands/S1/certificates", json=DATES | {"positions": [turned]}).json()
     assert (made["positions"][0]["theta_deg"], made["positions"][0]["psi_deg"]) == (0.0, 270.0)
+
+
+COMMON = {"u_alpha_common_arcsec": 0.3, "u_beta_common_arcsec": 0.0, "u_gamma_common_arcsec": None}
+
+
+def test_what_the_angles_share_comes_as_json_or_beside_a_file(stand: httpx.Client) -> None:
+    body = DATES | {"positions": [POSITION], "u_alpha_common_arcsec": 0.3, "u_beta_common_arcsec": 0}
+    one = stand.post("/stands/S1/certificates", json=body)
+    beside = DATES | {"number": "C-19", "u_alpha_common_arcsec": "0.3", "u_beta_common_arcsec": "0"}
+    other = stand.post("/stands/S1/certificates", params=beside, content=CSV, headers=AS_CSV)
+    for answer in (one, other):
+        assert answer.status_code == 201, answer.text
+        shown = stand.get(answer.headers["location"].removeprefix("/api/v1")).json()
+        for place in (answer.json(), shown):
+            assert {key: place[key] for key in COMMON} == COMMON
+    heads = stand.get("/stands/S1/certificates").json()["items"]
+    assert [head["u_alpha_common_arcsec"] for head in heads] == [0.3, 0.3, None]
+    table = stand.get("/stands/S1/certificates", headers={"accept": "text/csv"}).text
+    assert [row["u_alpha_common_arcsec"] for row in csv.DictReader(io.StringIO(table))] == ["0.3", "0.3", ""]
+
+
+@pytest.mark.parametrize("value", [-0.1, "0.3", 1e10])
+def test_what_the_angles_cannot_share(stand: httpx.Client, value: Any) -> None:
+    body = DATES | {"positions": [POSITION], "u_beta_common_arcsec": value}
+    refused = stand.post("/stands/S1/certificates", json=body)
+    assert refused.status_code == 422
+    assert [item["pointer"] for item in refused.json()["errors"]] == ["#/u_beta_common_arcsec"]
+
+
+@pytest.mark.parametrize("value", ["-0.1", "nan", "inf", "some", "1e10"])
+def test_what_the_angles_of_a_file_cannot_share(stand: httpx.Client, value: str) -> None:
+    params = DATES | {"u_beta_common_arcsec": value}
+    refused = stand.post("/stands/S1/certificates", params=params, content=CSV, headers=AS_CSV)
+    assert refused.status_code == 422, refused.text
+    assert [item["parameter"] for item in refused.json()["errors"]] == ["u_beta_common_arcsec"]
+
+
+STATEMENT = {
+    "u_gain_x_ppm": 50,
+    "u_gain_y_ppm": 50.5,
+    "u_azimuth_arcsec": 10,
+    "correlations": [{"between": ["gain_x", "gain_y"], "coefficient": 0.9}],
+    "dof": {"azimuth": 8},
+}
+
+
+def test_the_uncertainty_of_a_stand_is_stated_shown_and_cleared(stand: httpx.Client) -> None:
+    assert stand.get("/stands/S1").json()["uncertainty"] == {}
+    stated = stand.put("/stands/S1/uncertainty", json=STATEMENT)
+    assert stated.status_code == 200, stated.text
+    assert stated.json()["uncertainty"] == STATEMENT
+    assert stand.get("/stands/S1").json() == stated.json()
+    assert stand.get("/stands").json()["items"] == [stated.json()]
+    replaced = stand.put("/stands/S1/uncertainty", json={"u_gravity_ppm": 5, "u_gain_x_ppm": None})
+    assert replaced.json()["uncertainty"] == {"u_gravity_ppm": 5}
+    assert stand.put("/stands/S1/uncertainty", json={}).json()["uncertainty"] == {}
+    assert stand.get("/stands/S1").json()["uncertainty"] == {}
+
+
+@pytest.mark.parametrize(
+    ("change", "pointer", "code"),
+    [
+        ({"u_gain_ppm": 1}, "#/u_gain_ppm", "unknown-key"),
+        ({"a/b": 1}, "#/a~1b", "unknown-key"),
+        ({"u_gain_x_ppm": -1}, "#/u_gain_x_ppm", "not-a-number"),
+        ({"u_gain_x_ppm": "50"}, "#/u_gain_x_ppm", "not-a-number"),
+        ({"dof": {"azimuth": 0}}, "#/dof/azimuth", "not-a-number"),
+        ({"correlations": [{"between": [[], "gain_y"]}]}, "#/correlations/0", "bad-correlation"),
+    ],
+)
+def test_an_uncertainty_that_cannot_be(
+    stand: httpx.Client, change: dict[str, Any], pointer: str, code: str
+) -> None:
+    stand.put("/stands/S1/uncertainty", json=STATEMENT)
+    refused = stand.put("/stands/S1/uncertainty", json=STATEMENT | change)
+    assert refused.status_code == 422, refused.text
+    assert [(item["pointer"], item["code"]) for item in refused.json()["errors"]] == [(pointer, code)]
+    assert stand.get("/stands/S1").json()["uncertainty"] == STATEMENT
+
+
+@pytest.mark.parametrize("body", [b"[]", b"1", b'"text"'])
+def test_an_uncertainty_is_an_object(stand: httpx.Client, body: bytes) -> None:
+    headers = {"content-type": "application/json"}
+    refused = stand.put("/stands/S1/uncertainty", content=body, headers=headers)
+    assert (refused.status_code, refused.json()["code"]) == (422, "not-an-object")
+
+
+def test_an_uncertainty_needs_its_stand_and_a_token_that_reaches(
+    stand: httpx.Client, service: Service
+) -> None:
+    assert stand.put("/stands/S9/uncertainty", json=STATEMENT).status_code == 404
+    reading = service.client("read")
+    assert reading.put("/stands/S1/uncertainty", json=STATEMENT).status_code == 403
+    assert reading.put("/types/GVK-6/nominals", json={"nominals": {}}).status_code == 403
+    assert service.client(None).put("/stands/S1/uncertainty", json=STATEMENT).status_code == 401
+    assert reading.get("/stands/S1").json()["uncertainty"] == {}
 
 
 def test_certificates_newest_first(stand: httpx.Client) -> None:

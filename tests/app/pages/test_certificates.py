@@ -1,3 +1,4 @@
+import re
 from datetime import UTC, datetime, timedelta
 
 import pytest
@@ -6,6 +7,7 @@ from fastapi.testclient import TestClient
 from app.exchange.certificate import read_certificate
 from app.services import access, stands
 from app.services.lab import Lab
+from app.services.views import CommonAngles
 
 HEAD = {
     "stand": "S1",
@@ -105,6 +107,29 @@ def test_angles_in_an_odd_unit_are_asked_back_once(technician: TestClient, stock
     assert "If they are degrees or radians" in answer.text
     agreed = technician.post("/certificates/new", data={**HEAD, "pasted": small, "agreed": "yes"})
     assert agreed.status_code == 303
+
+
+def test_what_the_angles_share_is_kept_and_shown(technician: TestClient, stocked: Lab) -> None:
+    sent = _grid(u_alpha_common_arcsec="0,3", u_gamma_common_arcsec="0")
+    assert technician.post("/certificates/new", data=sent).status_code == 303
+    with stocked.read(access.SYSTEM) as work:
+        assert stands.certificate(work, "S1", "C-18").common == CommonAngles(0.3, None, 0.0)
+    page = re.sub(r"<[^>]+>", "", technician.get("/certificates/S1/C-18").text)
+    assert "Common to every position: u(α) = 0.3″, u(γ) = 0″." in page
+    assert "Common to every position" not in technician.get("/certificates/S1/C-17").text
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"), [("−0.3", "is not negative"), ("x", "is not a number"), ("1e10", "from 0 to")]
+)
+def test_what_the_angles_cannot_share(technician: TestClient, stocked: Lab, text: str, sentence: str) -> None:
+    answer = technician.post("/certificates/new", data=_grid(u_beta_common_arcsec=text))
+    assert answer.status_code == 422
+    said = re.search(r'id="f-u_beta_common_arcsec-problem">([^<]+)', answer.text)
+    assert said is not None
+    assert sentence in said[1]
+    assert 'name="u_beta_common_arcsec"' in answer.text
+    assert 'name="alpha_arcsec.15" value="15,5"' in answer.text
 
 
 @pytest.mark.parametrize("empty", [{}, {"theta_deg.0": "0", "psi_deg.0": "0"}])

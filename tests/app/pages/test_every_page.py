@@ -12,8 +12,8 @@ from app.services import access, calibrations
 from app.services.lab import Lab
 
 READABLE = [
-    "/", "/gyros", "/types/GVK-6", "/stands", "/stands/S1", "/certificates", "/certificates/S1/C-17", "/method",
-    "/validation", "/sessions", "/results", "/gyros/0417",
+    "/", "/gyros", "/types/GVK-6", "/stands", "/stands/S1", "/stands/S1/uncertainty", "/certificates",
+    "/certificates/S1/C-17", "/method", "/validation", "/sessions", "/results", "/gyros/0417",
 ]  # fmt: skip
 WRITABLE = [
     "/sessions/new",
@@ -28,6 +28,7 @@ POSTED = [
     "/gyros/0417/edit",
     "/types/GVK-6",
     "/stands/new",
+    "/stands/S1/uncertainty",
     "/certificates/new",
     "/simulations/new",
 ]

@@ -1,9 +1,11 @@
 import re
 
+import pytest
 from fastapi.testclient import TestClient
 
 from app.services import access, gyros
 from app.services.lab import Lab
+from app.services.views import Nominal
 
 
 def _limits(lab: Lab) -> dict[str, tuple[float, float]]:
@@ -22,7 +24,7 @@ def test_whoever_may_only_read_sees_fields_that_cannot_be_typed_into(
 ) -> None:
     page = designer.get("/types/GVK-6").text
     assert "readonly" in page
-    assert "Set these limits" not in page
+    assert "Set limits and nominal values" not in page
 
 
 def test_limits_are_set_with_point_or_comma(technician: TestClient, stocked: Lab) -> None:
@@ -46,6 +48,63 @@ def test_each_problem_stands_at_its_field(technician: TestClient, stocked: Lab) 
     assert turned.status_code == 422
     assert 'id="f-low_wk_deg_per_h_per_g-problem"' in turned.text
     assert _limits(stocked) == before
+
+
+def _nominals(lab: Lab) -> dict[str, Nominal]:
+    with lab.read(access.SYSTEM) as work:
+        return dict(gyros.types(work)[0].nominals)
+
+
+KX = "kx_deg_per_h_per_ma"
+NOMINAL = {f"nominal_{KX}": "2063,5", f"u_{KX}": "21", f"temperature_{KX}_per_k": "−0,4"}
+
+
+def test_limits_and_nominal_values_are_set_together(technician: TestClient, stocked: Lab) -> None:
+    sent = {**NOMINAL, "low_w0x_deg_per_h": "-1", "high_w0x_deg_per_h": "1", "nominal_w0x_deg_per_h": "0",
+            "u_w0x_deg_per_h": "1.5"}  # fmt: skip
+    assert technician.post("/types/GVK-6", data=sent).status_code == 303
+    assert _limits(stocked) == {"w0x": (-1.0, 1.0)}
+    assert _nominals(stocked) == {"kx": Nominal(2063.5, 21.0, -0.4), "w0x": Nominal(0.0, 1.5, None)}
+    page = technician.get("/types/GVK-6").text
+    fields = dict(re.findall(r'name="(\w+)" value="([^"]*)"', page))
+    assert fields[f"nominal_{KX}"] == "2063.5"
+    assert fields[f"temperature_{KX}_per_k"] == "−0.4"
+    assert technician.post("/types/GVK-6", data=fields).status_code == 303
+    assert _nominals(stocked) == {"kx": Nominal(2063.5, 21.0, -0.4), "w0x": Nominal(0.0, 1.5, None)}
+    assert technician.post("/types/GVK-6", data={}).status_code == 303
+    assert (_limits(stocked), _nominals(stocked)) == ({}, {})
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "sentence"),
+    [
+        ({f"u_{KX}": ""}, f"u_{KX}", "Give the nominal value and its standard deviation"),
+        ({f"nominal_{KX}": ""}, f"nominal_{KX}", "Give the nominal value and its standard deviation"),
+        ({f"u_{KX}": "0"}, f"u_{KX}", "must be greater than zero"),
+        ({f"u_{KX}": "−1"}, f"u_{KX}", "must be greater than zero"),
+        ({f"temperature_{KX}_per_k": "warm"}, f"temperature_{KX}_per_k", "is not a number"),
+    ],
+)
+def test_a_nominal_value_that_cannot_be(
+    technician: TestClient, stocked: Lab, change: dict[str, str], field: str, sentence: str
+) -> None:
+    before = _limits(stocked)
+    limits = {"low_w0x_deg_per_h": "-1", "high_w0x_deg_per_h": "1"}
+    answer = technician.post("/types/GVK-6", data={**limits, **NOMINAL, **change})
+    assert answer.status_code == 422
+    said = re.search(rf'id="f-{field}-problem">(.+?)</p>', answer.text)
+    assert said is not None
+    assert sentence in said[1]
+    assert 'name="low_w0x_deg_per_h" value="-1"' in answer.text
+    assert (_limits(stocked), _nominals(stocked)) == (before, {})  # neither is kept
+
+
+def test_what_is_wrong_with_both_tables_is_said_at_once(technician: TestClient, stocked: Lab) -> None:
+    turned = {"low_wk_deg_per_h_per_g": "2", "high_wk_deg_per_h_per_g": "1"}
+    answer = technician.post("/types/GVK-6", data={**turned, **NOMINAL, f"u_{KX}": "0"})
+    assert answer.status_code == 422
+    assert 'id="f-low_wk_deg_per_h_per_g-problem"' in answer.text
+    assert f'id="f-u_{KX}-problem"' in answer.text
 
 
 def test_an_unknown_type_is_not_there(technician: TestClient, stocked: Lab) -> None:
