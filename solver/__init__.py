@@ -21,4 +21,4 @@ Arrays hold positions along their first axis; parameters stand in the order of
 corrected and listed in `solver.successive`.
 """
 
-__version__ = "1.0.0"
+__version__ = "1.1.0"
