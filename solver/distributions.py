@@ -16,10 +16,11 @@ from solver.comparison import Comparison, compare
 from solver.conclusion import Solved
 from solver.draw_solutions import SessionModel, session_model
 from solver.errors import InputError, Message
-from solver.monte_carlo import TRIALS, MonteCarlo, run
+from solver.monte_carlo import MOST_TRIALS, TRIALS, MonteCarlo, run
 from solver.rate_noise import root_inverse, whitening_of
 from solver.records import PARAMETERS, Array
 from solver.robust import position_whitening
+from solver.uncertainty import LEVEL
 from solver.units import rad_per_s_from_deg_per_h, scale_from_deg_per_h_per_ma
 
 DISPLAY_UNITS: Array = np.array(
@@ -33,8 +34,10 @@ def propagate_distributions(
     *,
     trials: int | None = TRIALS,
     seed: int = 0,
-    level: float = 0.95,
+    level: float = LEVEL,
     digits: int = 2,
+    tighten: float = 1.0,
+    most: int = MOST_TRIALS,
     report: Callable[[float], None] | None = None,
 ) -> MonteCarlo:
     """Monte Carlo of one method's estimate; parameters as of `solver.monte_carlo.run`.
@@ -44,8 +47,17 @@ def propagate_distributions(
     InputError
         When nothing is known of the uncertainty, or a parameter is not determined.
     """
-    model = model_of(solved)
-    return run(model, trials=trials, seed=seed, level=level, digits=digits, unit=DISPLAY_UNITS, report=report)
+    return run(
+        model_of(solved),
+        trials=trials,
+        seed=seed,
+        level=level,
+        digits=digits,
+        unit=DISPLAY_UNITS,
+        tighten=tighten,
+        most=most,
+        report=report,
+    )
 
 
 def compare_with_budget(solved: Solved, budget: Budget, found: MonteCarlo, *, digits: int = 2) -> Comparison:

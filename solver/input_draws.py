@@ -8,8 +8,9 @@ degrees of freedom, and errors count the same way, true minus assumed::
     φ   = φ₀ + δφ,   nx, ny = (c, d)·(1 + δg)
 
 Distributions: normal (6.4.7), or with ν degrees of freedom the scaled and shifted t (6.4.9), whose
-standard deviation is u·√(ν/(ν − 2)); correlated inputs are drawn jointly, with one χ² for the group
-and the smallest ν in it, as `solver.uncertainty` groups them. Repeats of a position share its angles.
+standard deviation is u·√(ν/(ν − 2)); for ν ≤ 2 it has none, and only intervals mean anything.
+Correlated inputs are drawn jointly, with one χ² for the group and the smallest ν in it, as
+`solver.uncertainty` groups them. Repeats of a position share its angles.
 
 Draws lie along the last axis: (rows, m), so that every operation runs over contiguous memory.
 """
