@@ -56,7 +56,8 @@ _ROLES: Final = {
 
 _METHODS: Final = {
     "least-squares": marked("Least squares"), "paper": marked("Paper’s iteration"),
-    "both": marked("Both methods"),
+    "both": marked("Both methods"), "generalised": marked("Generalised least squares"),
+    "robust": marked("Robust (Huber)"),
 }  # fmt: skip
 
 _ORIGINS: Final = {
@@ -71,7 +72,7 @@ _KINDS: Final = {
 
 _PHASES: Final = {
     "": "", "solving": marked("solving"), "simulating": marked("simulating"), "reading": marked("reading"),
-    "keeping": marked("keeping the records"),
+    "keeping": marked("keeping the records"), "drawing": marked("drawing"),
 }  # fmt: skip
 
 

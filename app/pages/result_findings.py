@@ -1,13 +1,14 @@
 """What an examination found, as a result's page shows it: blunders with their places, what was not excluded."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from app.exchange.json_values import message_from
 from app.figures import degrees
 from app.i18n import gettext, marked, translate
 from app.services.views import MeasurementView
+from solver.errors import Message
 
 TITLES: Final = {
     "outlier": marked("one reading stands out"),
@@ -57,7 +58,16 @@ def findings(answer: Json, inputs: Sequence[MeasurementView]) -> list[FindingRow
 
 def not_excluded(answer: Json) -> list[str]:
     """What this fit cannot show, in sentences."""
-    return [translate(message_from(item)) for item in answer.get("not_excluded") or ()]
+    return [translate(_in_words(message_from(item))) for item in answer.get("not_excluded") or ()]
+
+
+def _in_words(message: Message) -> Message:
+    """A message whose kinds of blunders are named by their titles, not by their codes."""
+    kinds = message.values.get("kinds")
+    if not isinstance(kinds, str):
+        return message
+    words = [gettext(TITLES[code]) if code in TITLES else code for code in kinds.split(", ")]
+    return replace(message, values={**message.values, "kinds": ", ".join(words)})
 
 
 def _finding(item: Json, measured: Mapping[tuple[float, float, int], int]) -> FindingRow:

@@ -19,6 +19,7 @@ from app.services.sessions import NewSession
 from app.services.views import MeasurementView, SessionDetail, SessionView
 
 router = APIRouter()
+_TRIALS: Final = (0, calibrations.TRIALS, 10 * calibrations.TRIALS)
 
 STATES: Final = ("measuring", "ready", "solving", "failed", "solved")
 _PER_PAGE: Final = 50
@@ -122,6 +123,7 @@ def show(
         request, "sessions/detail.html", status=status, detail=found, session=found.session,
         map=position_map(found), superseded=_superseded(found), anchor=anchor, form=form or Form(),
         warnings=warnings, measured=[row for row in found.positions if _counts(row.measurement)],
+        methods=calibrations.METHODS[::-1], trials=_TRIALS, usual_trials=calibrations.TRIALS,
     )  # fmt: skip
 
 
@@ -139,9 +141,12 @@ def measured(person: Reader, lab: TheLab, session_id: int, form: Literal["csv", 
 @router.post("/sessions/{session_id}/solve")
 def solve(request: Request, person: Writer, lab: TheLab, session_id: int, sent: Sent) -> Response:
     """Ask for the calibration and watch it."""
-    method = sent.get("method")
+    form = Form.of(sent, "method", "monte_carlo")
+    fields = Fields(form)
+    trials = fields.whole("monte_carlo") if form.value("monte_carlo") else calibrations.TRIALS
+    fields.check()
     with lab.write(person) as work:
-        job = calibrations.request(work, session_id, method if isinstance(method, str) else "both")
+        job = calibrations.request(work, session_id, form.value("method") or "both", trials)
     return see(f"/jobs/{job.id}")
 
 
