@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.current_model import REGRESSORS
 from solver.hypotheses import Hypothesis, measuring_order
 from solver.records import Array, Observations
 
@@ -19,7 +20,7 @@ longer run is judged by its scatter besides."""
 _LEAST_RUN: Final = 2
 _RELATIVE: Final = 1e-4
 _HALF_CLIPPED: Final = 0.1
-_DIFFERENT: Final = 1e-3
+_DIFFERENT: Final = 0.1
 _SURE_RUN: Final = 3
 
 
@@ -44,15 +45,28 @@ def stuck_channels(observations: Observations) -> Iterator[Hypothesis]:
                 )  # fmt: skip
 
 
-def surely_stuck(observations: Observations, x: Array) -> str:
-    """Channels (of ``xy``) that repeat one value exactly at the end, where the orientation changes."""
+def surely_stuck(observations: Observations, x: Array, *, visible: bool) -> str:
+    """Channels (of ``xy``) that repeat one value at the end, where the orientation changes.
+
+    Exactly; or within noise from so early on that the rest does not tell the channel's scale factors
+    (`visible`), when the fit takes them for endless and is content.
+    """
     order = measuring_order(observations)
     found = ""
     for channel, name in enumerate("xy"):
-        currents, _ = _channel(observations, channel)
-        run = order[_run(currents[order], None) :]
-        if len(run) >= _SURE_RUN and np.ptp(x[run], axis=0).max() > _DIFFERENT:
-            found += name
+        currents, tolerance = _channel(observations, channel)
+        for allowed, least in (
+            (None, _SURE_RUN),
+            (tolerance[order], max(_SURE_RUN, len(order) - REGRESSORS)),
+        ):
+            run = order[_run(currents[order], allowed) :]
+            if (
+                len(run) >= least
+                and np.ptp(x[run], axis=0).max() > _DIFFERENT
+                and (allowed is None or not visible)
+            ):
+                found += name
+                break
     return found
 
 

@@ -108,14 +108,14 @@ def diagnose(
     session = Session.of(observations, common, None if prior is None else prior.with_coupling())
     explanations = invisible(session)
     suspicion = suspect(session)
-    if suspicion.search or surely_stuck(observations, session.x):
+    if suspicion.search or surely_stuck(observations, session.x, visible=session.visible):
         explanations += visible(session, suspicion)
     explanations = _distinct(explanations)
     findings = _findings(session, explanations)
     if not findings and session.improbable(session.good, UNEXPLAINED_LEVEL):
-        good = session.good.best
-        message = unexplained("χ²", good.squares, good.dof)
-        findings = (Finding(message.code, message, (), good.squares, None),)
+        chi2 = session.reported()
+        message = unexplained("χ²", chi2, session.good.best.dof)
+        findings = (Finding(message.code, message, (), chi2, None),)
     return Diagnosis(findings, _not_excluded(session, explanations))
 
 
@@ -136,14 +136,17 @@ def _findings(session: Session, explanations: list[Explanation]) -> tuple[Findin
         :_MOST_EQUIVALENT
     ]
     members = [best, *alike]
+    more = session.reported() - session.good.best.squares if session.told and not session.by_currents else 0.0
     return tuple(
-        _finding(session, item, [other for other in members if other is not item]) for item in members
+        _finding(session, item, [other for other in members if other is not item], more) for item in members
     )
 
 
-def _finding(session: Session, item: Explanation, others: list[Explanation]) -> Finding:
+def _finding(session: Session, item: Explanation, others: list[Explanation], more: float) -> Finding:
+    """A finding; `more` is what a result states as χ² beyond what the explanations start from."""
     observations = session.observations
-    message = verdict(item.code, observations, item.rows, item.details, item.fall)
+    measure, before, after = item.fall
+    message = verdict(item.code, observations, item.rows, item.details, (measure, before + more, after))
     details = dict(item.details)
     advice = None
     if others:
@@ -154,7 +157,7 @@ def _finding(session: Session, item: Explanation, others: list[Explanation]) -> 
         advice = separate([_named(observations, other) for other in others], _apart(item, others))
     return Finding(
         item.code, message, _positions(observations, item.rows),
-        item.before if session.told else None, item.after if session.told else None, details, advice,
+        item.before + more if session.told else None, item.after if session.told else None, details, advice,
     )  # fmt: skip
 
 

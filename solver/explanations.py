@@ -11,7 +11,7 @@ never gives more false alarms than that, however vague the prior, and loses noth
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -28,12 +28,11 @@ from solver.hypotheses import (
     wrong_positions,
 )
 from solver.hypothesis_fit import UNTOLD
-from solver.hypothesis_score import Score, Session, discrete_threshold
+from solver.hypothesis_score import Score, Session, Sum, discrete_threshold
 from solver.records import Array
 from solver.suspicion import Suspicion
 from solver.symmetries import Symmetry, approximate_symmetries, exact_symmetries
 from solver.units import deg_per_h_from_rad_per_s
-from solver.verdicts import number
 
 PRIOR_LEVEL: Final = 6e-3
 """False alarms of all that only a prior can tell, together."""
@@ -67,7 +66,7 @@ class Explanation:
     before, after
         χ², with the prior's part.
     fall
-        The same as a sentence shows it: ``measure``, ``before``, ``after``.
+        The same as a sentence shows it: χ², or the residuals' standard deviation, before and after.
     values, u : (8,) array or None
         Parameters with the data put right.
     """
@@ -80,7 +79,7 @@ class Explanation:
     significant: bool
     before: float
     after: float
-    fall: Mapping[str, str] = field(default_factory=dict)
+    fall: tuple[str, float, float] = ("χ²", np.nan, np.nan)
     values: Array | None = None
     u: Array | None = None
 
@@ -108,7 +107,7 @@ def visible(session: Session, suspicion: Suspicion) -> list[Explanation]:
     chosen += warm_ups(observations)
     chosen += stuck_channels(observations)
     chosen += saturated_channels(observations)
-    certain = surely_stuck(observations, x)
+    certain = surely_stuck(observations, x, visible=session.visible)
     scores = session.scores(chosen)
     session.by_currents = any(score.rates is None and session.significant(score) for score in scores)
     return [_explained(session, score, certain) for score in scores]
@@ -119,37 +118,27 @@ def _explained(session: Session, score: Score, certain: str = "") -> Explanation
     assert hypothesis is not None
     details = dict(hypothesis.details)
     if score.fitted is not None and hypothesis.course is not None:
-        course = hypothesis.course
-        last = float(course[np.argmax(np.abs(course - course.max()))] - course.max())
-        details["drift"] = tuple(float(size) * (last or 1.0) for size in score.fitted.drift)
+        change = float(np.ptp(hypothesis.course)) * (1 if details["course"] == "linear" else -1)
+        details["drift"] = tuple(float(size) * change for size in score.fitted.drift)
     sure = hypothesis.code == "channel-stuck" and details["channel"] in certain
     before, after = session.comparable(score)
-    distances = session.distance(session.good.fitted), session.distance(score.fitted)
-    if not session.nearer(score):
-        distances = 0.0, 0.0
-    total = session.total(score) - (_CERTAIN if sure else 0.0)
+    nearer = session.nearer(score)
+    apart = (session.good.distance or 0.0) if nearer else 0.0
+    squares = before.squares + apart, after.squares + apart - nearer
     return Explanation(
-        hypothesis.code, hypothesis.rows, details, total, session.gain(score) + session.nearer(score),
-        sure or session.significant(score), before.squares + distances[0], after.squares + distances[1],
-        _fall(session, score), *_parameters(session, score),
+        hypothesis.code, hypothesis.rows, details, session.total(score) - (_CERTAIN if sure else 0.0),
+        session.gain(score) + nearer, sure or session.significant(score), *squares,
+        ("χ²", *squares) if session.told else _scatters(before, after, by_currents=after is score.currents),
+        *_parameters(session, score),
     )  # fmt: skip
 
 
-def _fall(session: Session, score: Score) -> dict[str, str]:
-    before, after = session.comparable(score)
-    if session.told:
-        nearer = session.nearer(score)
-        apart = session.distance(session.good.fitted) if nearer else 0.0
-        return {
-            "measure": "χ²",
-            "before": number(before.squares + apart),
-            "after": number(after.squares + apart - nearer),
-        }
-    roots = [float(np.sqrt(item.variance)) for item in (before, after)]
-    if after is score.currents:
-        return {"measure": "s(J)/J", "before": number(roots[0]), "after": number(roots[1])}
-    rates = [deg_per_h_from_rad_per_s(UNTOLD * root) for root in roots]
-    return {"measure": "s/(°/h)", "before": number(rates[0]), "after": number(rates[1])}
+def _scatters(before: Sum, after: Sum, *, by_currents: bool) -> tuple[str, float, float]:
+    """Standard deviations of the residuals, of the rates or relative to the currents."""
+    one, other = (float(np.sqrt(item.variance)) for item in (before, after))
+    if by_currents:
+        return "s(J)/J", one, other
+    return "s/(°/h)", deg_per_h_from_rad_per_s(UNTOLD * one), deg_per_h_from_rad_per_s(UNTOLD * other)
 
 
 def _parameters(session: Session, score: Score) -> tuple[Array | None, Array | None]:
@@ -223,7 +212,7 @@ def _quantile(separations: list[float]) -> float:
 
 def _by_prior(session: Session, symmetry: Symmetry, thresholds: Thresholds) -> Explanation:
     fitted, prior = session.good.fitted, session.prior
-    before, values, u = session.distance(fitted), None, None
+    before, values, u = session.good.distance or 0.0, None, None
     after = before
     if fitted is not None:
         values, covariance = symmetry.apply(fitted.values, session.covariance(fitted))
@@ -234,8 +223,7 @@ def _by_prior(session: Session, symmetry: Symmetry, thresholds: Thresholds) -> E
     return Explanation(
         symmetry.code, (), symmetry.details, 2.0 * float(np.log(len(INVISIBLE))) + after - before, before - after,
         before > after and before - after > thresholds.of(symmetry), misfit + before, misfit + after,
-        {"measure": "χ²" if session.told else "D²", "before": number(misfit + before), "after": number(misfit + after)},
-        values, u,
+        ("χ²" if session.told else "D²", misfit + before, misfit + after), values, u,
     )  # fmt: skip
 
 
@@ -258,7 +246,7 @@ def _whole(session: Session, turned: Mapping[str, Symmetry]) -> list[tuple[Hypot
             gain = max(good.best.dof, 0) * float(np.log((before + floor) / (square + floor)))
         if hypothesis.code in turned and session.prior is not None and good.fitted is not None:
             moved = turned[hypothesis.code].apply(good.fitted.values, session.covariance(good.fitted))
-            gain += session.distance(good.fitted) - session.prior.distance(*moved, good.fitted.known)[0]
+            gain += (good.distance or 0.0) - session.prior.distance(*moved, good.fitted.known)[0]
         gains.append((hypothesis, gain))
     return gains
 

@@ -26,11 +26,11 @@ from solver.records import PARAMETERS, Array, Observations
 UNTOLD: Final = 1e-4 * EARTH_RATE
 """Unit of the sums of squares when u(J) is not given, rad/s."""
 _COUNT: Final = len(PARAMETERS)
-_ROUNDS: Final = 2
 _ROUNDS_WITHOUT: Final = 4
 _DISBELIEVED: Final = 1e5
 _NO_RANK: Final = 1e-9
 _SINGULAR: Final = 1e-6
+_CLEAR: Final = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +105,21 @@ def other_inputs(
     return np.asarray(part @ inputs.covariance[np.ix_(others, others)] @ part.T)
 
 
-def fit(data: Data, start: Array, others: Array | None) -> list[Fitted | None]:
+def rough(data: Data) -> Array:
+    """Parameters to begin from where each channel alone does not give them, (N, 8); NaN where both do not.
+
+    The observation equations by plain least squares, without those of missing currents: the channels help
+    each other through ωg and ωк.
+    """
+    count, n, _ = data.x.shape
+    right_side = (EARTH_RATE * data.x[..., :2]).reshape(count, 2 * n, 1)
+    both = np.concatenate((_design(data.x, data.currents), right_side), axis=-1)
+    both *= ~data.missing.reshape(count, 2 * n, 1)
+    solved = _solve(both)
+    return np.where((solved.sharp > _CLEAR)[:, None], solved.values, np.nan)
+
+
+def fit(data: Data, start: Array, others: Array | None, rounds: int = 2) -> list[Fitted | None]:
     """Fit every session put right; None where the scale factors become singular.
 
     Parameters
@@ -115,6 +129,8 @@ def fit(data: Data, start: Array, others: Array | None) -> list[Fitted | None]:
         Parameters to begin from, finite.
     others : (2n, 2n) array, optional
         V'.
+    rounds
+        Of reweighting, where no current is missing.
     """
     count, n, _ = data.x.shape
     values, alive = start.copy(), np.ones(count, dtype=np.bool_)
@@ -122,7 +138,7 @@ def fit(data: Data, start: Array, others: Array | None) -> list[Fitted | None]:
     currents, some = data.currents, data.missing.any()
     drift = data.course.any()
     extra = np.kron(data.course[..., None], np.eye(2)) if drift else np.zeros((count, 2 * n, 0))
-    for _ in range(_ROUNDS_WITHOUT if some else _ROUNDS):
+    for _ in range(_ROUNDS_WITHOUT if some else rounds):
         inverse, usable = _inverse(values)
         alive &= usable
         design = _design(data.x, currents)
@@ -153,6 +169,8 @@ class _Solved:
     seen: NDArray[np.bool_]
     vh: Array
     scale: Array
+    sharp: Array
+    """Smallest over largest singular value."""
 
 
 def _one(solved: _Solved, whitening: Array, index: int, gone: int, drift: bool) -> Fitted:
@@ -223,4 +241,6 @@ def _solve(both: Array) -> _Solved:
     over = np.where(seen, 1.0 / np.where(seen, s, 1.0), 0.0)
     root = np.swapaxes(vh, 1, 2) * over[:, None, :] / scale[..., None]
     values = np.matvec(root, np.vecmat(right_side, u))
-    return _Solved(values, root, right_side - np.matvec(design, values), u, seen, vh, scale)
+    return _Solved(
+        values, root, right_side - np.matvec(design, values), u, seen, vh, scale, s[:, -1] / s[:, 0]
+    )

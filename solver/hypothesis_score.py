@@ -13,7 +13,7 @@ from scipy import special
 
 from solver.current_model import CurrentModel, regressors
 from solver.hypotheses import Hypothesis
-from solver.hypothesis_fit import UNTOLD, Data, Fitted, fit, other_inputs
+from solver.hypothesis_fit import UNTOLD, Data, Fitted, fit, other_inputs, rough
 from solver.inputs import CommonUncertainty
 from solver.prior import Prior
 from solver.records import Array, Observations
@@ -23,7 +23,7 @@ LEVEL: Final = 1e-3
 DISCRETE_LEVEL: Final = 2e-4
 """The same for each kind without a free unknown that merely changes rows."""
 OCCAM: Final = 10.0
-"""2·ln(range/u) of a free unknown: anything up to 150 u is as likely."""
+"""2·ln(range/u) of a free unknown: anything up to 150 u is as likely; a larger one, of δ, costs 2·ln(δ/u)."""
 REPETITION: Final = 25.0
 """Fall of χ² that a stuck or saturated channel must explain: the noise of two readings gives that once in 1e5."""
 CLEAR_RATIO: Final = 40.0
@@ -33,6 +33,7 @@ UNTOLD_RATIO: Final = 25.0
 DOUBT: Final = 1e-3
 """Probability of χ² below which the stated noise is no longer trusted for tests."""
 _LEAST_FREEDOM: Final = 3
+_ROUNDS_OF_RESULT: Final = 3
 _ROUNDING: Final = 1e-10
 
 
@@ -63,12 +64,15 @@ class Score:
         Of the eight parameters' fit; None without it.
     currents
         Of `CurrentModel`, which has two unknowns more.
+    distance
+        D² from the prior; None without prior or fit.
     """
 
     hypothesis: Hypothesis | None
     fitted: Fitted | None
     rates: Sum | None
     currents: Sum
+    distance: float | None = None
 
     @property
     def best(self) -> Sum:
@@ -94,6 +98,8 @@ class Session:
         Of the data as given.
     rest : (n, 2) array
         Residuals of the currents in `model`.
+    visible
+        Whether the scale factors show in the data as given.
     """
 
     observations: Observations
@@ -106,6 +112,7 @@ class Session:
     told: bool
     good: Score
     rest: Array
+    visible: bool
     by_currents: bool = False
     """Compare all by `CurrentModel`, because what explains the data leaves the scale factors undetermined."""
 
@@ -125,10 +132,12 @@ class Session:
             u = np.tile(np.where(square > 0, square, 1.0), (len(at), 1))
         model = CurrentModel.of(x, currents, 1.0 / u**2)
         solutions = model.solve(x[None], currents[None], model.weights[None], told=told)
-        start = solutions.start[0]
-        others = other_inputs(at, start, common) if told and np.isfinite(start).all() else None
+        start, visible = solutions.start[0], bool(np.isfinite(solutions.start[0, 0]))
+        others = other_inputs(at, start, common) if told and visible else None
         score = Score(None, None, None, Sum(float(solutions.squares[0]), int(solutions.dof[0])))
-        session = cls(observations, common, prior, x, model, u, others, told, score, solutions.rest[0])
+        session = cls(
+            observations, common, prior, x, model, u, others, told, score, solutions.rest[0], visible
+        )
         session.good = session.scores([None])[0]
         return session
 
@@ -151,13 +160,18 @@ class Session:
         weights = np.where(missing, 0.0, 1.0 / u**2)
         solutions = self.model.solve(x, currents, weights, told=self.told)
         fits: list[Fitted | None] = [None] * count
-        able = np.flatnonzero(np.isfinite(solutions.start[:, 0]))
+        start = solutions.start
+        unable = np.isnan(start[:, 0])
+        if self.visible and unable.any():
+            told_u = u[unable] if self.told else None
+            start[unable] = rough(Data(x[unable], currents[unable], told_u, missing[unable], course[unable]))
+        able = np.flatnonzero(np.isfinite(start[:, 0]))
         for part in (able[~missing[able].any(axis=(1, 2))], able[missing[able].any(axis=(1, 2))]):
             if len(part):
                 data = Data(
                     x[part], currents[part], u[part] if self.told else None, missing[part], course[part]
                 )
-                for index, fitted in zip(part, fit(data, solutions.start[part], self.others), strict=True):
+                for index, fitted in zip(part, fit(data, start[part], self.others), strict=True):
                     fits[index] = fitted
         return [
             self._score(h, f, float(solutions.squares[i]), int(solutions.dof[i]))
@@ -175,7 +189,23 @@ class Session:
             if fitted is not None and not self.told:
                 weight = float(fitted.values[channel] / UNTOLD) ** 2
         rates = None if fitted is None else Sum(fitted.squares + scatter * weight, fitted.dof + count)
-        return Score(hypothesis, fitted, rates, Sum(squares + scatter * by_currents, dof + count))
+        currents = Sum(squares + scatter * by_currents, dof + count)
+        return Score(hypothesis, fitted, rates, currents, self._distance(fitted))
+
+    def reported(self) -> float:
+        """χ² of the data as given, as a result by least squares states it.
+
+        With grossly wrong data the weights, by which χ² is judged, depend on where their iteration begins.
+        """
+        if self.good.rates is None or self.others is not None or not self.told:
+            return self.good.best.squares
+        data = Data(
+            self.x[None], self.model.currents[None], self.u[None],
+            np.zeros((1, *self.u.shape), dtype=np.bool_), np.zeros((1, len(self.x))),
+        )  # fmt: skip
+        start = rough(data)
+        fitted = fit(data, start, None, rounds=_ROUNDS_OF_RESULT)[0] if np.isfinite(start).all() else None
+        return self.good.rates.squares if fitted is None else fitted.squares
 
     def comparable(self, score: Score) -> tuple[Sum, Sum]:
         """Sums of good data and of a hypothesis in one and the same kind of fit."""
@@ -196,20 +226,28 @@ class Session:
 
     def nearer(self, score: Score) -> float:
         """By how much D² falls."""
-        if self.prior is None or self.good.fitted is None or score.fitted is None:
+        if self.good.distance is None or score.distance is None:
             return 0.0
-        return self.distance(self.good.fitted) - self.distance(score.fitted)
+        return self.good.distance - score.distance
 
     def total(self, score: Score) -> float:
         """T, by which hypotheses are ranked, beside that of good data."""
         assert score.hypothesis is not None
-        occam = 2.0 * float(np.log(score.hypothesis.members)) + OCCAM * score.hypothesis.free
+        occam = 2.0 * float(np.log(score.hypothesis.members)) + self._free(score)
         return occam - self.fall(score) - self.nearer(score)
 
-    def distance(self, fitted: Fitted | None) -> float:
-        """D² of a fit; 0 without prior or fit."""
-        if self.prior is None or fitted is None:
+    def _free(self, score: Score) -> float:
+        """Occam's price of the free unknowns, by the size that they take."""
+        free = score.hypothesis.free if score.hypothesis is not None else 0
+        if not free:
             return 0.0
+        good, other = self.comparable(score)
+        unit = 1.0 if self.told else max(other.variance, np.finfo(float).tiny)
+        return free * max(OCCAM, float(np.log(max(good.squares - other.squares, unit) / (free * unit))))
+
+    def _distance(self, fitted: Fitted | None) -> float | None:
+        if self.prior is None or fitted is None:
+            return None
         return self.prior.distance(fitted.values, self.covariance(fitted), fitted.known)[0]
 
     def covariance(self, fitted: Fitted) -> Array:
@@ -239,7 +277,8 @@ class Session:
                 REPETITION if self.told and not doubtful else CLEAR_RATIO if self.told else UNTOLD_RATIO
             )
         if hypothesis.free:
-            return self._by_chance(score, doubtful) * hypothesis.members < LEVEL
+            clear = not doubtful or not self.told or gain > CLEAR_RATIO
+            return clear and self._by_chance(score, doubtful) * hypothesis.members < LEVEL
         if doubtful:
             return gain > (CLEAR_RATIO if self.told else UNTOLD_RATIO)
         return gain > discrete_threshold(hypothesis.members)

@@ -38,7 +38,7 @@ def verdict(
     observations: Observations,
     rows: Sequence[int],
     details: Mapping[str, Any],
-    fall: Mapping[str, str],
+    fall: tuple[str, float, float],
 ) -> Message:
     """The sentence of a finding.
 
@@ -52,12 +52,13 @@ def verdict(
     details
         Of the hypothesis.
     fall
-        ``measure`` (χ², s of the residuals, or the distance from the prior), ``before`` and ``after``.
+        What falls (χ², s of the residuals, or the distance from the prior), before and after.
     """
-    named = {**fall, "positions": places(observations, rows)}
+    shown = {"measure": fall[0], "before": number(fall[1]), "after": number(fall[2])}
+    named = {**shown, "positions": places(observations, rows)}
     if code in _IN_THE_FIT:
         return _in_the_fit(code, observations, rows, details, named)
-    return _of_the_session(code, details, dict(fall))
+    return _of_the_session(code, details, shown)
 
 
 _IN_THE_FIT: Final = frozenset(
