@@ -32,6 +32,10 @@ class ReportPage:
         """When it was begun."""
         return datetime.fromisoformat(self.report["started_at"])
 
+    def text(self, text: str) -> str:
+        """A title, source or note of the report in the language of the page."""
+        return gettext(text)
+
     def mark(self, item: Mapping[str, Any]) -> Mark:
         """Verdict on a check, a case, a group or the whole."""
         passed = item["verdict"] == "pass"

@@ -2,10 +2,11 @@
 
 from collections.abc import Callable
 from datetime import UTC, datetime
+from functools import partial
 from time import monotonic
 from typing import Final
 
-from app.validation import nist
+from app.validation import coverage, gum, jcgm101, nbs14, nist, worked
 from app.validation.environment import environment
 from app.validation.numbers import digest
 from app.validation.report import Group, Progress, Report
@@ -18,7 +19,14 @@ Suite = Callable[[Progress], Group]
 
 def suites(full: bool, seed: int) -> dict[str, tuple[float, Suite]]:
     """Every suite by its key, with its share of the time."""
-    return {"nist-strd": (1.0, nist.group)}
+    return {
+        "nist-strd": (1.0, nist.group),
+        "gum": (1.0, gum.group),
+        "jcgm101": (8.0, partial(jcgm101.group, seed=seed)),
+        "nbs14": (1.0, nbs14.group),
+        "worked": (1.0, worked.group),
+        "coverage": (400.0 if full else 20.0, partial(coverage.group, full=full, seed=seed)),
+    }
 
 
 def run(progress: Progress, *, full: bool = False, seed: int = SEED) -> Report:
