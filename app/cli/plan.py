@@ -1,7 +1,7 @@
 """Planning from files, with no database."""
 
 import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -17,7 +17,7 @@ from app.exchange.uncertainties import read_uncertainties
 from app.services import planning
 from app.services.plan_question import Asked, Question, Subject
 from app.services.plan_subjects import typical
-from app.services.plan_views import Planned
+from app.services.plan_views import Planned, as_json
 from solver.errors import Message
 from solver.records import PARAMETERS
 
@@ -62,7 +62,7 @@ def plan(
     ] = None,
     counts: Annotated[bool, typer.Option("--counts", help="Compare 4 to 16 positions as well.")] = False,
     trade: Annotated[bool, typer.Option("--trade", help="The trade between u(K) and u(ωg) as well.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="For programs.")] = False,
+    for_programs: Annotated[bool, typer.Option("--json", help="For programs.")] = False,
 ) -> None:
     """Tell what positions will tell, or propose the best ones, before anything is measured."""
     rows, warnings = read_certificate(_bytes(certificate), str(certificate))
@@ -82,7 +82,7 @@ def plan(
         )
     except Invalid as error:
         raise Invalid(*(_at_option(item) for item in error.problems)) from error
-    if as_json:
+    if for_programs:
         typer.echo(dumps(_json(found, warnings)))
     else:
         print_planned(found, warnings)
@@ -111,10 +111,6 @@ def _bytes(path: Path) -> bytes:
 
 
 def _json(found: Planned, warnings: list[Message]) -> dict[str, Any]:
-    written = asdict(found)
-    written["nominal_source"] = found.nominal_source.text
-    for entry, item in zip(written["plan"]["parameters"], found.plan.parameters, strict=True):
-        entry["of_limits"] = item.of_limits
-    told = [*warnings, *found.plan.warnings]
-    written["plan"]["warnings"] = [message_json(item) for item in told]
-    return {name: value for name, value in written.items() if value is not None}
+    written = as_json(found)
+    written["plan"]["warnings"][:0] = [message_json(item) for item in warnings]
+    return written

@@ -10,6 +10,7 @@ and a change of theme needs no redrawing. `theme.printed` puts the light or dark
 
 from app.plots.convergence import Change, convergence
 from app.plots.drift import DriftEvent, DriftLimit, DriftPoint, drift
+from app.plots.pareto import TradeMark, pareto
 from app.plots.record import Stretch, record
 from app.plots.residuals import LIMIT_SD, Place, Residual, decade, residuals
 from app.plots.theme import printed
@@ -24,9 +25,11 @@ __all__ = [
     "Place",
     "Residual",
     "Stretch",
+    "TradeMark",
     "convergence",
     "decade",
     "drift",
+    "pareto",
     "printed",
     "record",
     "residuals",

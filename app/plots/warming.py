@@ -5,6 +5,7 @@ from typing import Final
 
 from app.plots.convergence import template as convergence_template
 from app.plots.drift import template as drift_template
+from app.plots.pareto import template as pareto_template
 from app.plots.record import template as record_template
 from app.plots.residuals import template as residuals_template
 
@@ -29,6 +30,7 @@ def make_templates() -> None:
     """Make what every later chart is filled from; done once in a process."""
     residuals_template()
     convergence_template()
+    pareto_template("", "")
     for with_dates in (True, False):
         drift_template(with_dates)
     for channel in ("x", "y"):

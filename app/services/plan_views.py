@@ -1,9 +1,10 @@
 """What a plan shows: frozen, in laboratory units."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
 
+from app.exchange.json_values import message_json
 from app.services.views import Verdict
 from solver.errors import Message
 
@@ -129,3 +130,13 @@ class Planned:
     plan: Plan
     counts: tuple[Worth, ...] = ()
     trade: Trade | None = None
+
+
+def as_json(planned: Planned) -> dict[str, Any]:
+    """The whole answer for programs; what was not asked for is left out."""
+    written = asdict(planned)
+    written["nominal_source"] = planned.nominal_source.text
+    for entry, item in zip(written["plan"]["parameters"], planned.plan.parameters, strict=True):
+        entry["of_limits"] = item.of_limits
+    written["plan"]["warnings"] = [message_json(item) for item in planned.plan.warnings]
+    return {name: value for name, value in written.items() if value not in (None, ())}
