@@ -131,7 +131,7 @@ def sums_of(z: Array, u: Array | None) -> Sums:
 def inverse_scales(values: Array) -> Array:
     """K⁻¹ of values (8, B), (2, 2, B)."""
     kx, ky, kxy, kyx = values[:4]
-    return np.array([[ky, -kxy], [-kyx, kx]]) / (kx * ky - kxy * kyx)
+    return np.asarray(np.array([[ky, -kxy], [-kyx, kx]]) / (kx * ky - kxy * kyx))
 
 
 def _pair(g: Array, first: Array, second: Array) -> Array:
@@ -177,7 +177,7 @@ class Weighted:
     def scales(self) -> Array:
         """K, the inverse of g, (2, 2, B or 1)."""
         (a, b), (c, d) = self.g
-        return np.array([[d, -b], [-c, a]]) / (a * d - b * c)
+        return np.asarray(np.array([[d, -b], [-c, a]]) / (a * d - b * c))
 
     def variances(self) -> tuple[Array, Array]:
         """Diagonal of C for Y, (2, 3, B), and for ωg, ωк, (2, B)."""

@@ -15,17 +15,9 @@ from solver.inputs import CommonUncertainty
 from solver.least_squares import solve
 from solver.observability import find_invisible, natural_scale, unobservable
 from solver.rate_noise import Problem, rough, whiten, whitening_of
-from solver.records import Estimate, Observations
+from solver.records import Observations
 
-__all__ = [
-    "REWEIGHTING_ROUNDS",
-    "Linearised",
-    "Solved",
-    "least_squares",
-    "least_squares_estimate",
-    "paper",
-    "paper_estimate",
-]
+__all__ = ["REWEIGHTING_ROUNDS", "Linearised", "Solved", "least_squares", "paper"]
 
 REWEIGHTING_ROUNDS: Final = 2
 
@@ -85,17 +77,3 @@ def paper(
     )
     problem = Problem(equations, observations, common)
     return conclude("paper", problem, values, solution.gain @ rows, solution, invisible, history=history)
-
-
-def least_squares_estimate(
-    equations: Equations, observations: Observations | None = None, common: CommonUncertainty | None = None
-) -> Estimate:
-    """Answer of `least_squares` alone."""
-    return least_squares(equations, observations, common).estimate
-
-
-def paper_estimate(
-    equations: Equations, observations: Observations, common: CommonUncertainty | None = None
-) -> Estimate:
-    """Answer of `paper` alone."""
-    return paper(equations, observations, common).estimate

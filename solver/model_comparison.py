@@ -100,6 +100,8 @@ class ModelComparison:
         The supported terms together: their values in one model.
     time_assumed : bool
         Whether the positions are taken as measured one after the other at equal times.
+    duration : float
+        From the first position's time to the last one's, s, over which the drifts count; NaN where assumed.
     verdict : Message
         In words.
     """
@@ -110,6 +112,7 @@ class ModelComparison:
     supported: tuple[Term, ...]
     chosen: TermTest | None
     time_assumed: bool
+    duration: float
     verdict: Message
 
 
@@ -140,7 +143,8 @@ def compare_models(
     supported = () if base.only_rounding else _forward(base, columns, testable, level)
     chosen = base.test(supported, columns, None) if supported else None
     verdict = _verdict(supported, testable)
-    return ModelComparison(level, tests, joint, supported, chosen, time_assumed, verdict)
+    duration = float(np.ptp(observations.time)) if len(observations) else np.nan
+    return ModelComparison(level, tests, joint, supported, chosen, time_assumed, duration, verdict)
 
 
 def holm(p_values: list[float]) -> list[float]:

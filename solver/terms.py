@@ -5,8 +5,8 @@ Coefficients on the left side of the x and y equations of a position:
     wn              ωн·nx·nz                    ωн·ny·nz                 g²-sensitive drift, full model (3)
     drift_x         Δω0x·(t − t̄)/T              0                        linear drift of ω0x over the session
     drift_y         0                           Δω0y·(t − t̄)/T           … and of ω0y
-    wg_difference   ½(ωgx − ωgy)·c              −½(ωgx − ωgy)·d          separate ωg for x and y
-    wk_difference   −½(ωкx − ωкy)·d             −½(ωкx − ωкy)·c          separate ωк for x and y
+    wg_split        ½(ωgx − ωgy)·c              −½(ωgx − ωgy)·d          separate ωg for x and y
+    wk_split        −½(ωкx − ωкy)·d             −½(ωкx − ωкy)·c          separate ωк for x and y
 
 so that the model of eight is the case in which they are zero; the last two give each axis its own
 coefficients, as IEEE Std 813 has them. The drift is the change from the session's first position to its last.
@@ -19,10 +19,10 @@ import numpy as np
 from solver.geometry import elements_of
 from solver.records import Array, Observations
 
-Term = Literal["wn", "drift_x", "drift_y", "wg_difference", "wk_difference"]
-TERMS: Final[tuple[Term, ...]] = ("wn", "drift_x", "drift_y", "wg_difference", "wk_difference")
+Term = Literal["wn", "drift_x", "drift_y", "wg_split", "wk_split"]
+TERMS: Final[tuple[Term, ...]] = ("wn", "drift_x", "drift_y", "wg_split", "wk_split")
 SYMBOLS: Final = {
-    "wn": "ωн", "drift_x": "Δω0x", "drift_y": "Δω0y", "wg_difference": "ωgx ≠ ωgy", "wk_difference": "ωкx ≠ ωкy",
+    "wn": "ωн", "drift_x": "Δω0x", "drift_y": "Δω0y", "wg_split": "ωgx ≠ ωgy", "wk_split": "ωкx ≠ ωкy",
 }  # fmt: skip
 """How a sentence names each term: symbols, in no language."""
 
@@ -36,8 +36,8 @@ def term_columns(observations: Observations) -> tuple[dict[Term, Array], bool]:
         "wn": (at.c * at.e, at.d * at.e),
         "drift_x": (moment, none),
         "drift_y": (none, moment),
-        "wg_difference": (at.c, -at.d),
-        "wk_difference": (-at.d, -at.c),
+        "wg_split": (at.c, -at.d),
+        "wk_split": (-at.d, -at.c),
     }
     return {term: np.stack(pair, axis=-1).ravel() for term, pair in pairs.items()}, assumed
 

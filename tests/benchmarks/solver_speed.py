@@ -6,7 +6,9 @@ a session of sixteen positions with noise of 0.005 °/h; the batch is 10,000 dra
 
 The library functions give the estimate alone; `estimate` and `solve_batch` give its covariance too,
 `solve` the singular values and vectors, `calibrate` everything of a result (weights from the scale
-factors, observability, outliers, …).
+factors, observability, outliers, …). `solve_sessions` begins with angles and currents: it forms the
+equations, weights them by u(J) in two rounds, and gives values, covariance, χ² and a verdict on what
+is observable; `FixedWeights` forms the equations' sums and solves them once.
 """
 
 import os
@@ -17,7 +19,10 @@ from collections.abc import Callable
 import numpy as np
 from scipy import optimize
 
+from solver.batch import Stand, solve_sessions
+from solver.block import BLOCK
 from solver.calibrate import calibrate
+from solver.draws import FixedWeights
 from solver.error_model import Equations, currents, design_matrix, observation_equations, scale_matrix
 from solver.geometry import case_orientation, elements
 from solver.least_squares import column_scale, estimate, solve, solve_batch
@@ -51,8 +56,10 @@ def session(rng: np.random.Generator) -> Observations:
     )  # fmt: skip
 
 
-def batch(observations: Observations, equations: Equations, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Whitened designs (N, 32, 8) and right sides (N, 32) with fresh noise in every current."""
+def batch(
+    observations: Observations, equations: Equations, rng: np.random.Generator
+) -> tuple[Array, Array, Array, Array]:
+    """Whitened designs (N, 32, 8), right sides (N, 32) and the currents with fresh noise in every one."""
     at = elements(
         case_orientation(
             observations.theta, observations.psi, observations.alpha, observations.beta, observations.gamma
@@ -65,7 +72,7 @@ def batch(observations: Observations, equations: Equations, rng: np.random.Gener
     assert values is not None
     noise = u * np.sqrt(np.linalg.det(scale_matrix(values.values)))
     design = design_matrix(at, jx, jy) / noise
-    return design, np.broadcast_to(equations.right_side / noise, (BATCH, 32)).copy()
+    return design, np.broadcast_to(equations.right_side / noise, (BATCH, 32)).copy(), jx, jy
 
 
 def medians(tasks: dict[str, Callable[[], object]], runs: int, in_a_row: int = 1) -> dict[str, float]:
@@ -107,7 +114,7 @@ def main() -> None:
     rng = np.random.default_rng(1)
     observations = session(rng)
     equations = observation_equations(observations)
-    designs, right_sides = batch(observations, equations, rng)
+    designs, right_sides, jx, jy = batch(observations, equations, rng)
     design, right_side = designs[0], right_sides[0]
     scale = column_scale(design)
 
@@ -125,6 +132,21 @@ def main() -> None:
     )
     report("One session of 16 positions (32 equations, 8 unknowns)", single, "µs", 1e6)
 
+    stand = Stand(observations.theta, observations.psi, observations.latitude)
+    angles = np.column_stack((observations.alpha, observations.beta, observations.gamma))
+    every_angle = np.broadcast_to(angles, (BATCH, *angles.shape)).copy()
+    u_jx, u_jy = observations.u_jx, observations.u_jy
+    assert u_jx is not None
+    assert u_jy is not None
+    reference = calibrate(observations, "least-squares").least_squares
+    assert reference is not None
+    fixed = FixedWeights.of(reference.values, np.column_stack((u_jx, u_jy)))
+
+    def draws() -> None:
+        for first in range(0, BATCH, BLOCK):
+            part = slice(first, first + BLOCK)
+            fixed.solve(stand.block(angles, jx[part], jy[part]))
+
     many = medians(
         {
             "numpy.linalg.lstsq": lambda: [
@@ -134,6 +156,11 @@ def main() -> None:
                 by_scipy(designs[i], right_sides[i], scale) for i in range(SCIPY_PART)
             ],
             "solver solve_batch": lambda: solve_batch(designs, right_sides),
+            "solver solve_sessions, same angles": lambda: solve_sessions(stand, angles, jx, jy, u_jx, u_jy),
+            "solver solve_sessions, own angles": lambda: solve_sessions(
+                stand, every_angle, jx, jy, u_jx, u_jy
+            ),
+            "solver FixedWeights": draws,
         },
         BATCH_RUNS,
     )

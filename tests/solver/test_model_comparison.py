@@ -16,7 +16,7 @@ from tests.solver.uncertain_sessions import Uncertain, without_u
 EIGHTHS = grid((0, 45, 90, 135), (0, 90, 180, 270))
 """Positions that show ωн as well: nx·nz ≠ 0 at θ = 45 and 135°."""
 SETUP = Setup(noise=0.005, u_given=True, positions=EIGHTHS)
-SIZE = {"wn": 0.05, "drift_x": 0.06, "drift_y": 0.06, "wg_difference": 0.03, "wk_difference": 0.03}
+SIZE = {"wn": 0.05, "drift_x": 0.06, "drift_y": 0.06, "wg_split": 0.03, "wk_split": 0.03}
 """Ten standard uncertainties of each term or more, °/h (per g or g²)."""
 
 
@@ -48,8 +48,8 @@ def test_columns_are_those_of_the_model(term, rng):
         "wn": (turn_c * turn_e, turn_d * turn_e),
         "drift_x": (middle, 0 * middle),
         "drift_y": (0 * middle, middle),
-        "wg_difference": (1.0 * turn_c, -1.0 * turn_d),  # ωgx = ωg + 1 and ωgy = ωg − 1
-        "wk_difference": (-1.0 * turn_d, -1.0 * turn_c),  # −(ωк + 1)·d and (ωк − 1)·c
+        "wg_split": (1.0 * turn_c, -1.0 * turn_d),  # ωgx = ωg + 1 and ωgy = ωg − 1
+        "wk_split": (-1.0 * turn_d, -1.0 * turn_c),  # −(ωк + 1)·d and (ωк − 1)·c
     }[term]
     column = term_columns(observations)[0][term].reshape(-1, 2)
     np.testing.assert_allclose(column, np.column_stack(expected), atol=1e-15)
@@ -65,7 +65,7 @@ def _up(observations):
 
 def test_one_term_beside_textbook_regression(rng):
     """Without u: F, p, value and u of ordinary regression with nine columns; F is t²."""
-    observations = timed(without_u(with_term(SETUP.observe(rng), "wg_difference", 0.01)))
+    observations = timed(without_u(with_term(SETUP.observe(rng), "wg_split", 0.01)))
     equations = observation_equations(observations)
     found = compare(observations)
     for term, test in zip(TERMS, found.tests, strict=True):
@@ -153,10 +153,10 @@ def test_a_real_term_is_found(term, given):
 
 def test_several_terms_at_once(rng):
     observations = timed(SETUP.observe(rng), rng)
-    for term in ("drift_x", "wk_difference"):
+    for term in ("drift_x", "wk_split"):
         observations = with_term(observations, term, 2 * SIZE[term])
     found = compare(observations)
-    assert set(found.supported) == {"drift_x", "wk_difference"}
+    assert set(found.supported) == {"drift_x", "wk_split"}
     assert found.chosen.terms == found.supported
     for term, value, u in zip(
         found.supported, found.chosen.values, found.chosen.standard_uncertainties, strict=True
@@ -210,8 +210,12 @@ def test_unknown_times_are_taken_in_the_methods_order(rng):
     assert np.all(np.diff(second) > 0)
     assert first.max() < second.min()
     assert np.ptp(moment) == pytest.approx(1.0)
-    assert compare(observations).time_assumed
-    assert not compare(timed(observations)).time_assumed
+    found = compare(observations)
+    assert found.time_assumed
+    assert np.isnan(found.duration)
+    found = compare(timed(observations))
+    assert not found.time_assumed
+    assert found.duration == 31 * 90.0
 
 
 def test_one_moment_shows_no_drift(rng):
