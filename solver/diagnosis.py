@@ -132,9 +132,13 @@ def _findings(session: Session, explanations: list[Explanation]) -> tuple[Findin
     best = next((item for item in explanations if item.significant), None)
     if best is None:
         return ()
-    alike = [item for item in explanations if item is not best and abs(item.total - best.total) < EQUIVALENT][
-        :_MOST_EQUIVALENT
-    ]
+    alike = [
+        item
+        for item in explanations
+        if item is not best
+        and abs(item.total - best.total) < EQUIVALENT
+        and (item.significant or {item.code, best.code} <= INVISIBLE)
+    ][:_MOST_EQUIVALENT]
     members = [best, *alike]
     more = session.reported() - session.good.best.squares if session.told and not session.by_currents else 0.0
     return tuple(
