@@ -7,7 +7,7 @@ from solver.budget import CORRELATION, SCATTER, make_budget
 from solver.calibrate import calibrate
 from solver.inputs import CommonUncertainty, inputs_of
 from solver.records import PARAMETERS
-from tests.solver.sessions import LAB, Setup, truth
+from tests.solver.sessions import DEG_PER_H, LAB, Setup, truth
 
 ARCSEC = np.pi / 180 / 3600
 EVERYTHING = {
@@ -132,6 +132,16 @@ def test_angles_of_repeated_positions_are_kept_beside_the_scatter(rng):
     budget = make_budget(at.gain, at.inputs, scatter=at.scatter, scatter_dof=at.scatter_dof)
     assert budget.lines == (SCATTER, "angles")
     np.testing.assert_allclose(budget.covariance, found.least_squares.covariance, rtol=1e-9, atol=0)
+
+
+def test_scatter_takes_the_place_of_a_stated_noise(rng):
+    """Inputs that tell u(J) too: the currents' noise is counted once, by what the residuals show."""
+    at = linearised(session(rng))
+    scatter = (0.01 * DEG_PER_H) ** 2 * np.eye(32)
+    budget = make_budget(at.gain, at.inputs, scatter=scatter, scatter_dof=24)
+    assert budget.lines == (SCATTER,)
+    u = np.sqrt(np.diagonal(at.gain @ scatter @ at.gain.T))
+    np.testing.assert_allclose(budget.standard_uncertainties, u, rtol=1e-12)  # rounding
 
 
 @pytest.mark.parametrize("dof", [3.0, 50.0])

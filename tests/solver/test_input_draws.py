@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from solver.error_model import scale_matrix
 from solver.input_draws import Errors, input_draws
 from solver.inputs import COMMON, CommonUncertainty, inputs_of
-from tests.solver.sessions import DEG_PER_H, Setup, truth
+from tests.solver.sessions import DEG_PER_H, Setup, grid, truth
 from tests.solver.test_budget import ARCSEC, COEFFICIENTS, EVERYTHING, session
 
 EARTH = 7.292115e-5
@@ -146,6 +146,20 @@ def test_repeats_share_the_angles_and_not_the_noise(rng):
     assert len(np.unique(errors.angles)) == 3 * 16 * 4
     assert len(np.unique(errors.currents)) == 2 * 32 * 4
     assert not errors.common.any()
+
+
+def test_one_position_measured_three_times(rng):
+    """Only its rows share angles, wherever they stand."""
+    positions = np.vstack((grid(), [(90, 180), (90, 180)]))
+    setup = Setup(positions=positions, noise=0.005, u_given=True)
+    observations = setup.observe(rng)
+    u = np.full(18, 1e-5)
+    observations = replace(observations, u_alpha=u, u_beta=u, u_gamma=u)
+    angles = input_draws(observations, truth(), None).errors(rng, 1).angles[0, :, 0]
+    same = np.isclose(observations.theta, np.pi / 2) & np.isclose(observations.psi, np.pi)
+    assert same.sum() == 3
+    assert len(np.unique(angles[same])) == 1
+    assert len(np.unique(angles)) == 16
 
 
 def test_finite_degrees_of_freedom_give_students_t(rng):
