@@ -13,8 +13,8 @@ from solver.error_model import Equations
 from solver.errors import NotConverged, SolverError
 from solver.inputs import CommonUncertainty
 from solver.least_squares import solve
-from solver.observability import find_invisible, natural_scale, unobservable
-from solver.rate_noise import Problem, rough, whiten, whitening_of
+from solver.observability import natural_scale, unobservable
+from solver.rate_noise import Problem, invisible_in, rough, whiten, whitening_of
 from solver.records import Observations
 
 __all__ = ["REWEIGHTING_ROUNDS", "Linearised", "Solved", "least_squares", "paper"]
@@ -30,7 +30,8 @@ def least_squares(
     Certificate angles and what is in common count for the uncertainty, not for the weights
     (`solver.generalised` weighs by all).
     """
-    invisible = find_invisible(equations)
+    problem = Problem(equations, observations, common)
+    invisible = invisible_in(problem)
     design, right_side, whitening = equations.design, equations.right_side, None
     if equations.u_currents is not None:
         for _ in range(REWEIGHTING_ROUNDS):
@@ -42,7 +43,6 @@ def least_squares(
             right_side = whiten(whitening, equations.right_side)
     solution = solve(design, right_side, scale=natural_scale(design), invisible=invisible.directions)
     gain = solution.gain if whitening is None else whiten(whitening, solution.gain.T, transpose=True).T
-    problem = Problem(equations, observations, common)
     return conclude("least-squares", problem, solution.values, gain, solution, invisible)
 
 
@@ -61,7 +61,8 @@ def paper(
     """
     method, mean = successive.position_weights(observations)
     rows = successive.combination(method, mean)
-    invisible = find_invisible(equations, rows)
+    problem = Problem(equations, observations, common)
+    invisible = invisible_in(problem, rows)
     try:
         values, history = successive.successive_approximations(equations, method, mean)
     except SolverError as error:
@@ -75,5 +76,4 @@ def paper(
         scale=natural_scale(equations.design),
         invisible=invisible.directions,
     )
-    problem = Problem(equations, observations, common)
     return conclude("paper", problem, values, solution.gain @ rows, solution, invisible, history=history)

@@ -13,8 +13,8 @@ from solver.errors import InputError, Message
 from solver.estimation import REWEIGHTING_ROUNDS
 from solver.inputs import CommonUncertainty
 from solver.least_squares import solve
-from solver.observability import find_invisible, natural_scale
-from solver.rate_noise import Problem, inverse_scale, root_inverse, rough
+from solver.observability import natural_scale
+from solver.rate_noise import Problem, inverse_scale, invisible_in, root_inverse, rough
 from solver.records import Observations
 
 
@@ -37,7 +37,7 @@ def generalised(
             )
         )
     problem = Problem(equations, observations, common)
-    invisible = find_invisible(equations)
+    invisible = invisible_in(problem)
     design, right_side, whitening = equations.design, equations.right_side, None
     for _ in range(REWEIGHTING_ROUNDS):
         values = rough(design, right_side, invisible)

@@ -35,8 +35,8 @@ from solver.constants import EARTH_RATE
 from solver.error_model import Equations
 from solver.errors import Message
 from solver.inputs import CommonUncertainty
-from solver.observability import Invisible, find_invisible, natural_scale, visible_from
-from solver.rate_noise import Problem, inverse_scale, root_inverse, rough
+from solver.observability import Invisible, natural_scale, visible_from
+from solver.rate_noise import Problem, inverse_scale, invisible_in, root_inverse, rough
 from solver.records import Array, Observations
 from solver.terms import SYMBOLS, TERMS, Term, term_columns
 
@@ -174,8 +174,9 @@ class _Base:
     def of(
         cls, equations: Equations, observations: Observations, common: CommonUncertainty | None
     ) -> "_Base":
-        invisible = find_invisible(equations)
-        whitening = _whitening(Problem(equations, observations, common), invisible)
+        problem = Problem(equations, observations, common)
+        invisible = invisible_in(problem)
+        whitening = _whitening(problem, invisible)
         design, right_side = equations.design, equations.right_side
         if whitening is not None:
             design, right_side = whitening @ design, whitening @ right_side

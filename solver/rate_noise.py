@@ -17,7 +17,7 @@ the part of the residuals that no parameters explain. It has m − p degrees of 
 estimator, since residuals of two of them differ by what parameters do explain.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from solver.error_model import Equations, rate_covariance, scale_matrix
 from solver.inputs import CommonUncertainty, Inputs, inputs_of
 from solver.least_squares import estimate, solve
-from solver.observability import Invisible, natural_scale
+from solver.observability import Invisible, find_invisible, natural_scale
 from solver.records import Array, Observations, UncertaintyBasis
 
 INDEPENDENT: Final = ("currents", "angles")
@@ -83,6 +83,31 @@ class Noise:
     independent: Array
     rest: Array
     scatter: float = float("nan")
+
+
+def invisible_in(problem: Problem, rows: Array | None = None) -> Invisible:
+    """What the data do not determine, the certified angles' errors counted as noise of the currents.
+
+    A misalignment δ that the certificate does not tell turns the vector of which Jx and Jy are two
+    components, so the currents vary by δ times its length without the equations knowing why; K is not
+    needed for that, only the largest excursion of the measured currents from their mean. At a pole
+    this, and not u(J), is what makes the columns of K look independent.
+
+    Parameters
+    ----------
+    rows
+        As for `solver.observability.find_invisible`.
+    """
+    equations, at = problem.equations, problem.observations
+    if at is None or equations.u_currents is None:
+        return find_invisible(equations, rows)
+    angle = np.sqrt((at.u_alpha**2 + at.u_beta**2 + at.u_gamma**2) / 3.0)
+    if not angle.any():
+        return find_invisible(equations, rows)
+    currents = np.stack((at.jx, at.jy), axis=1)
+    excursion = float(np.linalg.norm(currents - currents.mean(axis=0), axis=1).max())
+    noise = np.hypot(equations.u_currents, (angle * excursion)[:, None])
+    return find_invisible(replace(equations, u_currents=noise), rows)
 
 
 def noise_of(problem: Problem, values: Array, dof: int, invisible: Invisible) -> Noise:

@@ -23,7 +23,7 @@ from solver.error_model import Equations
 from solver.huber import HuberFit, huber, normal_factor
 from solver.inputs import CommonUncertainty
 from solver.least_squares import complement, solve
-from solver.observability import Invisible, find_invisible, natural_scale
+from solver.observability import Invisible, natural_scale
 from solver.rate_noise import (
     INDEPENDENT,
     Noise,
@@ -31,6 +31,7 @@ from solver.rate_noise import (
     by_scatter,
     inexplicable,
     inverse_scale,
+    invisible_in,
     noise_of,
     part_of,
     rough,
@@ -54,7 +55,7 @@ def robust(
         When the iterated weights do not settle.
     """
     problem = Problem(equations, observations, common)
-    invisible = find_invisible(equations)
+    invisible = invisible_in(problem)
     values = rough(equations.design, equations.right_side, invisible)
     whitening = None
     for _ in range(ROUNDS):

@@ -10,6 +10,7 @@ from solver.budget import make_budget
 from solver.calibrate import calibrate
 from solver.error_model import observation_equations
 from solver.estimation import Solved, least_squares, paper
+from solver.generalised import generalised
 from solver.inputs import CommonUncertainty, inputs_of
 from solver.observability import find_invisible
 from solver.rate_noise import Problem, noise_of, root_inverse
@@ -176,3 +177,15 @@ def test_noise_of_an_undetermined_scale_is_unknown(rng):
     noise = noise_of(Problem(equations, observations), np.ones(8), 20, find_invisible(equations))
     assert noise.basis == "none"
     assert np.isnan(noise.covariance).all()
+
+
+@pytest.mark.parametrize("method", [least_squares, generalised])
+@pytest.mark.parametrize("noise", [0.005, 5e-5])
+def test_errors_of_the_angles_do_not_pretend_to_show_the_scale_at_a_pole(noise, method, rng):
+    """With quiet currents it is the certificate's 60″ that makes their columns look independent."""
+    case = Uncertain(Setup(noise=noise, u_given=True, latitude=90.0))
+    for _ in range(5):
+        observations = case.observe(rng)
+        estimate = solve(method, observations).estimate
+        assert np.isnan(estimate.values[:2]).all()
+        assert estimate.uncertainty_basis == "none"
