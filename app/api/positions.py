@@ -10,10 +10,11 @@ from app.api.bodies import FILE_TYPES, StreamedBody, body_of
 from app.api.pagination import CSV_TOO, Listing, wants_csv
 from app.api.schemas.common import Id, Incoming, Name, PathAngle
 from app.api.schemas.measuring import MeasuredRecord, Measurement, NewMeans, Position, Repeat
+from app.api.schemas.noise import PositionNoise, position_noise
 from app.api.schemas.warned import warned
 from app.exchange.means import write_means_csv
 from app.exchange.rows import MeansRow
-from app.services import calibrations, ingest, sessions, uploads
+from app.services import calibrations, ingest, noise, sessions, uploads
 
 router = APIRouter(tags=["sessions"])
 
@@ -100,3 +101,13 @@ def put_currents(
     response.status_code = 201 if saved.new else 200
     shown = Measurement.model_validate(saved.measurement)
     return MeasuredRecord.model_validate(dict(shown) | {"warnings": warned(warnings)})
+
+
+@router.get(_PLACE + "/noise", responses={404: {}})
+def read_noise(
+    session_id: Id, theta_deg: Theta, psi_deg: Psi, which: Annotated[Which, Query()], caller: Reader
+) -> PositionNoise:
+    """What the record that counts says of its noise; 404 for a position without a record."""
+    with caller.read() as work:
+        kept = noise.currents_at(work, session_id, theta_deg, psi_deg, which.repeat)
+    return position_noise(noise.analysed(kept))

@@ -10,8 +10,9 @@ from app.figures import plain
 from app.i18n import gettext
 from app.pages.base import Reader, TheLab, render
 from app.pages.entry import anchor
+from app.pages.noise_view import noise_view
 from app.pages.tables import csv_answer
-from app.services import measurements, traces
+from app.services import measurements, noise, traces
 from app.services.measurements import MeasurementDetail
 from app.services.traces import Trace
 
@@ -30,7 +31,7 @@ def page(
     request: Request, person: Reader, lab: TheLab, measurement_id: int, since: Second = None,
     until: Second = None,
 ) -> Response:  # fmt: skip
-    """The measurement and, where there is one, its record between two times."""
+    """The measurement and, where there is one, its record between two times, and the record's noise."""
     with lab.read(person) as work:
         found = measurements.detail(work, measurement_id)
         begin, end = _window(found, since, until)
@@ -39,11 +40,13 @@ def page(
             if found.record
             else None
         )
+        kept = noise.currents(work, measurement_id) if found.record else None
     return render(
         request, "measurements/page.html", found=found, measurement=found.measurement,
         session=found.session, trace=trace, window=(begin, end),
         charts=list(_charts(request, found, trace, (begin, end))) if trace else [],
         zooms=list(_zooms(found, (begin, end))) if trace else [], anchor=anchor,
+        noise=noise_view(noise.analysed(kept)) if kept else None,
     )  # fmt: skip
 
 

@@ -8,6 +8,8 @@ Colours are the stylesheet's variables: the page that shows a chart decides betw
 and a change of theme needs no redrawing. `theme.printed` puts the light or dark values in for paper.
 """
 
+from app.plots.allan import AllanPoint, MeanPoint, allan
+from app.plots.autocorrelation import autocorrelation
 from app.plots.convergence import Change, convergence
 from app.plots.drift import DriftEvent, DriftLimit, DriftPoint, drift
 from app.plots.pareto import TradeMark, pareto
@@ -18,14 +20,18 @@ from app.plots.warming import warm_up
 
 __all__ = [
     "LIMIT_SD",
+    "AllanPoint",
     "Change",
     "DriftEvent",
     "DriftLimit",
     "DriftPoint",
+    "MeanPoint",
     "Place",
     "Residual",
     "Stretch",
     "TradeMark",
+    "allan",
+    "autocorrelation",
     "convergence",
     "decade",
     "drift",

@@ -3,6 +3,8 @@
 import threading
 from typing import Final
 
+from app.plots.allan import template as allan_template
+from app.plots.autocorrelation import template as autocorrelation_template
 from app.plots.convergence import template as convergence_template
 from app.plots.drift import template as drift_template
 from app.plots.pareto import template as pareto_template
@@ -30,6 +32,8 @@ def make_templates() -> None:
     """Make what every later chart is filled from; done once in a process."""
     residuals_template()
     convergence_template()
+    allan_template()
+    autocorrelation_template()
     pareto_template("", "")
     for with_dates in (True, False):
         drift_template(with_dates)
