@@ -19,13 +19,15 @@ from solver.position_search import (
     TIE,
     Counts,
     Found,
+    Judge,
     Tables,
     best_set,
     every_set,
     exchanges,
     number_of_sets,
 )
-from solver.proposing import check, tables_of
+from solver.position_tables import tables_of
+from solver.proposing import buried_of, check
 from solver.records import PARAMETERS, Array
 
 ALIKE: Final = 1e-3
@@ -96,7 +98,7 @@ def trade_off(
     """
     check(candidates, count, "D", repeats=False)
     tables = tables_of(candidates, duration, at)
-    measure = _measure(first, second, tables.scale)
+    measure = _measure(first, second, tables.scale, buried_of(tables.scale, at, count))
     if number_of_sets(len(tables), count, repeats=False) <= exhaustive_up_to:
         found = _exhaustive(tables, count, measure, alike)
     else:
@@ -119,12 +121,15 @@ def uncertainties(
     return np.asarray(np.exp(_measure(first, second, tables.scale)(covariance)[0] / 2))
 
 
-def _measure(first: tuple[str, ...], second: tuple[str, ...], scale: Array) -> Measure:
+def _measure(
+    first: tuple[str, ...], second: tuple[str, ...], scale: Array, buried: Judge | None = None
+) -> Measure:
     groups = [[PARAMETERS.index(name) for name in group] for group in (first, second)]
 
     def both(found: Array) -> Array:
         variances = np.einsum("bii->bi", found) * scale**2
-        return np.asarray(np.log(np.stack([variances[:, group].mean(axis=1) for group in groups], axis=1)))
+        pair = np.log(np.stack([variances[:, group].mean(axis=1) for group in groups], axis=1))
+        return np.asarray(pair if buried is None else pair + buried(found)[:, None])
 
     return both
 

@@ -7,6 +7,10 @@ g-sensitive drift by its rate at 1 g. The criteria:
 - ``D``: the volume of the region of confidence; its figure is the root mean product of the eight rates;
 - ``A``: the root mean square of the eight rates;
 - the name of a parameter: its own uncertainty.
+
+Sets by which the scale factors would hardly stand out from the noise are kept out as far as there
+are others: the noise of the currents, which stand in the design matrix, would then hide a loss of
+rank and a session would name those parameters as not determined (`solver.observability`).
 """
 
 from collections.abc import Sequence
@@ -17,27 +21,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.constants import EARTH_RATE
-from solver.error_model import design_matrix, scale_matrix
+from solver.error_model import scale_matrix
 from solver.errors import InputError, Message
-from solver.geometry import commanded, elements
-from solver.inputs import by_angles, by_common
-from solver.least_squares import column_scale
+from solver.observability import visible_from
 from solver.planning import (
     FEWEST,
     Circumstances,
     Places,
     Prediction,
     duration_at,
-    elements_at,
     predict,
-    whitened,
 )
 from solver.position_search import EXHAUSTIVE_UP_TO, Counts, Found, Judge, Tables, best_set
-from solver.records import PARAMETERS, Array, Observations
+from solver.position_tables import tables_of
+from solver.records import PARAMETERS, Array
 
 CRITERIA: Final = ("D", "A", *PARAMETERS)
-_SAME_ORIENTATION: Final = 9
-"""Decimals of a, b, c, d to which twins agree."""
+_KEPT_OUT: Final = 10.0
 _EFFORT_OF_EACH: Final = 0.15
 """Share of the starts when one count after the other is tried, each from the best of the one before."""
 
@@ -51,7 +51,7 @@ class Proposal:
     rows : (N,) int array
         Of the candidates, in their order; one that is repeated stands there several times.
     figure : float
-        What the criterion makes of it, SI: see the module. It says nothing unless `determines`.
+        What the criterion makes of it, SI: see the module. NaN unless `determines`.
     determines : bool
         Whether what the criterion asks for is determined; when not, no other choice does it either.
     prediction
@@ -110,7 +110,7 @@ def propose(
     check(candidates, count, criterion, repeats=repeats)
     duration = duration_at(total, moving, count)
     tables = tables_of(candidates, duration, at)
-    judge = judge_of(criterion, tables.scale, at)
+    judge = judge_of(criterion, tables.scale, at, count)
     found = best_set(tables, count, judge, repeats=repeats, seed=seed, exhaustive_up_to=exhaustive_up_to)
     return _proposal(candidates, found, duration, at, criterion)
 
@@ -137,7 +137,7 @@ def best_counts(
             continue
         duration = duration_at(total, moving, count)
         tables = tables_of(candidates, duration, at)
-        judge = judge_of(criterion, tables.scale, at)
+        judge = judge_of(criterion, tables.scale, at, count)
         near = _grown(tables, found[-1].rows, count, judge, repeats=repeats) if found else None
         best = best_set(
             tables, count, judge, repeats=repeats, near=near, effort=_EFFORT_OF_EACH,
@@ -181,7 +181,7 @@ def _proposal(
     prediction = predict(candidates.chosen(rows), duration, at)
     asked = [PARAMETERS.index(criterion)] if criterion in PARAMETERS else list(range(len(PARAMETERS)))
     determines = not prediction.undetermined[asked].any()
-    figure = float(np.exp(found.value / 2))
+    figure = figure_of(criterion, prediction.covariance, at) if determines else float("nan")
     return Proposal(rows, figure, determines, prediction, found.exhaustive, found.starts, found.tried)
 
 
@@ -205,8 +205,20 @@ def rates_of(at: Circumstances) -> Array:
     return np.array([EARTH_RATE / typical] * 4 + [1.0] * 4)
 
 
-def judge_of(criterion: str, scale: Array, at: Circumstances) -> Judge:
-    """The criterion as the logarithm of a variance, for covariances in parameters over `scale`."""
+def figure_of(criterion: str, covariance: Array, at: Circumstances) -> float:
+    """The criterion of one covariance, (8, 8), SI."""
+    logarithm = _criterion(criterion, np.ones(len(PARAMETERS)), at)(covariance[None])[0]
+    return float(np.exp(logarithm / 2))
+
+
+def judge_of(criterion: str, scale: Array, at: Circumstances, count: int) -> Judge:
+    """The criterion for covariances in parameters over `scale`, with what keeps buried sets out."""
+    plain, buried = _criterion(criterion, scale, at), buried_of(scale, at, count)
+    return lambda found: plain(found) + buried(found)
+
+
+def _criterion(criterion: str, scale: Array, at: Circumstances) -> Judge:
+    """The criterion as the logarithm of a variance."""
     rates = rates_of(at) * scale
     if criterion == "D":
         constant = 2.0 * float(np.log(rates).sum())
@@ -217,51 +229,18 @@ def judge_of(criterion: str, scale: Array, at: Circumstances) -> Judge:
     return lambda found: np.asarray(np.log(found[:, row, row] * scale[row] ** 2))
 
 
-def tables_of(candidates: Places, duration: float, at: Circumstances) -> Tables:
-    """What each candidate adds to the information, for `solver.position_search`."""
-    jx, jy = at.currents(candidates)
-    whitening = at.whitening(duration)
-    design = whitened(whitening, design_matrix(elements_at(candidates), jx, jy))
-    scale = 1.0 / column_scale(design)
-    rows = (design * scale).reshape(-1, 2, len(PARAMETERS))
-    transposed = rows.transpose(0, 2, 1)
-    own, common = _uncertain(candidates, jx, jy, at, transposed @ whitening)
-    information = (transposed @ rows).reshape(len(candidates), -1)
-    return Tables(information, own, common, scale, _twins(candidates))
+def buried_of(scale: Array, at: Circumstances, count: int) -> Judge:
+    """How far, as a logarithm, the scale factors are from standing out of the noise; 0 where they do.
 
+    In units of the noise's own, the smallest singular value of the currents' columns is at least
+    1/(√N·u(K)/K) with u(K) the root of the sum over all four factors; `solver.observability` says
+    how large it must be.
+    """
+    limit = 1.0 / (count * visible_from(2 * count) ** 2)
+    relative = (rates_of(at)[:4] / EARTH_RATE * scale[:4]) ** 2
 
-def _uncertain(
-    candidates: Places, jx: Array, jy: Array, at: Circumstances, weights: Array
-) -> tuple[Array | None, Array | None]:
-    """How uncertain angles and common inputs enter, by the weights (n, 8, 2) of each candidate's residuals."""
-    observed = _in_this_order(candidates, jx, jy, at)
-    own = common = None
-    u_angles = np.stack((candidates.u_alpha, candidates.u_beta, candidates.u_gamma), axis=1)
-    if u_angles.any():
-        effect = weights @ (by_angles(observed, at.parameters) * u_angles[:, None, :])
-        own = (effect @ effect.transpose(0, 2, 1)).reshape(len(candidates), -1)
-    if at.common.standard.any():
-        variances, vectors = np.linalg.eigh(at.common.covariance)
-        root = vectors * np.sqrt(np.maximum(variances, 0.0))
-        shown = by_common(observed, at.parameters, at.common).reshape(len(candidates), 2, -1)
-        common = (weights @ shown @ root).reshape(len(candidates), -1)
-    return own, common
+    def buried(found: Array) -> Array:
+        variances = np.einsum("bii->bi", found)[:, :4] @ relative
+        return np.asarray(_KEPT_OUT * np.log(np.maximum(variances / limit, 1.0)))
 
-
-def _in_this_order(places: Places, jx: Array, jy: Array, at: Circumstances) -> Observations:
-    """Every candidate once, not sorted as `Observations.sorted_from` would."""
-    n = len(places)
-    none, infinite = np.zeros(n), np.full(n, np.inf)
-    return Observations(
-        theta=places.theta, psi=places.psi, repeat=np.zeros(n, np.int64), alpha=places.alpha,
-        beta=places.beta, gamma=places.gamma, jx=jx, jy=jy, u_jx=None, u_jy=None, duration=none, rate=none,
-        time=none, u_alpha=places.u_alpha, u_beta=places.u_beta, u_gamma=places.u_gamma, dof_jx=infinite,
-        dof_jy=infinite, latitude=at.latitude,
-    )  # fmt: skip
-
-
-def _twins(places: Places) -> NDArray[np.int64]:
-    """One number for positions whose commanded orientation has the same a, b, c, d, as θ + 180°, ψ + 180° has."""
-    nominal = elements(commanded(places.theta, places.psi))
-    key = np.round(np.stack((nominal.a, nominal.b, nominal.c, nominal.d), axis=1), _SAME_ORIENTATION) + 0.0
-    return np.unique(key, axis=0, return_inverse=True)[1].ravel()
+    return buried

@@ -53,7 +53,7 @@ class Search:
     """How the positions were found: `figure` is what the criterion makes of them, in `unit`."""
 
     criterion: str
-    figure: float
+    figure: float | None
     unit: str
     candidates: int
     exhaustive: bool

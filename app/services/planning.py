@@ -202,7 +202,8 @@ def _view(
     search = None
     if found is not None:
         search = Search(
-            asked.criterion, _figure(asked.criterion, found.figure), _unit(asked.criterion), candidates,
+            asked.criterion, _figure(asked.criterion, found.figure) if found.determines else None,
+            _unit(asked.criterion), candidates,
             found.exhaustive, found.starts, found.tried,
         )  # fmt: skip
     return Plan(

@@ -13,7 +13,8 @@ from solver.errors import InputError
 from solver.inputs import CommonUncertainty
 from solver.planning import Circumstances, NoiseModel, Places, predict
 from solver.position_search import Tables, best_set, every_set, number_of_sets
-from solver.proposing import CRITERIA, best_counts, propose, tables_of
+from solver.position_tables import tables_of
+from solver.proposing import CRITERIA, best_counts, propose
 from solver.records import PARAMETERS
 from tests.solver.sessions import DEG_PER_H, Setup, grid, to_case, truth
 
@@ -138,7 +139,7 @@ def test_certified_angles_of_a_half_turn_decide_between_twins():
     """θ and ψ both turned by 180° give the same a, b, c, d: the better certified of the two is taken."""
     whole = grid(thetas=(0, 45, 90, 180, 225, 270), psis=(0, 90, 180, 270))
     u = np.where(np.isin(whole[:, 0], (0, 45, 90)), 200.0, 1.0) * ARCSEC
-    found = propose(places(whole, np.zeros((24, 3)), u[:, None]), 6, 360.0, 0.0, circumstances())
+    found = propose(places(whole, np.zeros((24, 3)), u[:, None]), 5, 300.0, 0.0, circumstances())
     assert set(whole[found.rows, 0]) <= {180, 225, 270}
     tables = tables_of(places(whole, np.zeros((24, 3))), 60.0, circumstances())
     assert len(np.unique(tables.twins)) == 12
@@ -205,6 +206,23 @@ def test_with_repeats_few_different_positions_are_enough():
     often = propose(places(SMALL, angles_of(9)), 9, 540.0, 0.0, circumstances(), repeats=True)
     assert often.figure < once.figure
     assert len(set(often.rows.tolist())) < 9
+
+
+def test_sets_in_which_noise_hides_the_scale_factors_are_not_proposed():
+    """Without drift, θ = 90° and 270° alone show ωg best, but as at a pole K could stand for it."""
+    nothing = Circumstances(truth(w0x=0, w0y=0, wg=0, wk=0, kxy=0, kyx=0), 0.97, circumstances().noise)
+    plan = places(grid(), np.zeros((16, 3)))
+    for count in (4, 6):
+        found = propose(plan, count, 60.0 * count, 0.0, nothing, "wg")
+        assert found.determines
+        assert not found.prediction.undetermined.any()
+        figures_of_others = []
+        rng = np.random.default_rng(count)
+        for _ in range(80):
+            other = predict(plan.chosen(rng.choice(16, count, replace=False)), 60.0, nothing)
+            if not other.undetermined[6]:
+                figures_of_others.append(other.u[6])
+        assert min(figures_of_others) >= found.figure * (1 - 1e-9)
 
 
 def test_nothing_is_proposed_where_nothing_is_determined():

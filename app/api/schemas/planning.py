@@ -74,7 +74,7 @@ class Search(Outgoing):
     """How the positions were found."""
 
     criterion: str
-    figure: float = Field(description="What the criterion makes of them, in `unit`.")
+    figure: float | None = Field(description="What the criterion makes of them, in `unit`.")
     unit: str
     candidates: int
     exhaustive: bool = Field(description="Every set was tried, so none is better.")
