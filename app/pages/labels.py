@@ -43,7 +43,8 @@ _SUFFIXES: Final = {
 }  # fmt: skip
 
 _UNITS: Final = {
-    "deg/h/mA": marked("°/h/mA"), "deg/h": marked("°/h"), "deg/h/g": marked("°/h/g"), "mA": marked("mA"),
+    "deg/h/mA": marked("°/h/mA"), "deg/h": marked("°/h"), "deg/h/g": marked("°/h/g"),
+    "deg/h/g2": marked("°/h/g²"), "mA": marked("mA"),
     "µA": marked("µA"), "nA": marked("nA"), "s": marked("s"), "Hz": marked("Hz"), "arcsec": "″",
     "deg": "°", "°C": "°C", "ppm": marked("ppm"), "K": marked("K"),
 }  # fmt: skip

@@ -11,11 +11,11 @@ from app.pages import labels
 from solver.records import PARAMETERS
 
 TERMS: Final = {
-    "wn": marked("ωn, g²-sensitive drift"),
-    "w0x_per_s": marked("drift of ω0x in time"),
-    "w0y_per_s": marked("drift of ω0y in time"),
-    "wg_split": marked("ωg of x and of y apart, half their difference"),
-    "wk_split": marked("ωk of x and of y apart, half their difference"),
+    "wn": marked("g²-sensitive drift ωn"),
+    "drift_x": marked("drift of ω0x over the session"),
+    "drift_y": marked("drift of ω0y over the session"),
+    "wg_split": marked("half of what ωg differs from x to y"),
+    "wk_split": marked("half of what ωk differs from x to y"),
 }
 """Further terms in words; pass through `gettext`."""
 _END_DIGITS: Final = 3
@@ -49,10 +49,11 @@ class Model:
         found = answer.get("model")
         if not found:
             return None
-        return cls(translate(message_from(found["conclusion"])), [_term(item) for item in found["terms"]])
+        rows = [_term(item, item["term"] in found["supported"]) for item in found["terms"]]
+        return cls(translate(message_from(found["conclusion"])), rows)
 
 
-def _term(item: Json) -> TermRow:
+def _term(item: Json, supported: bool) -> TermRow:
     reason = item.get("reason")
     expanded = item.get("expanded_uncertainty")
     return TermRow(
@@ -60,8 +61,8 @@ def _term(item: Json) -> TermRow:
         shown=measured(item["value"], expanded),
         unit=labels.unit(item["unit"]),
         f=DASH if item["f"] is None else significant(item["f"], 3),
-        p=DASH if item["p_value"] is None else significant(item["p_value"], 2),
-        supported=item["supported"],
+        p=DASH if item["p_holm"] is None else significant(item["p_holm"], 2),
+        supported=supported,
         reason=translate(message_from(reason)) if reason else "",
     )
 

@@ -7,6 +7,7 @@ from typing import Any, Final
 from app.errors import Invalid, problem
 from app.exchange.distributions import monte_carlo_json, no_monte_carlo_json
 from app.exchange.examination import diagnosis_json
+from app.exchange.further_terms import model_json
 from app.exchange.json_values import Json, dumps
 from app.exchange.parameters import Known
 from app.exchange.prior import prior_si
@@ -17,7 +18,9 @@ from app.exchange.uncertainties import common_uncertainty
 from solver.calibrate import Calibration, calibrate
 from solver.diagnosis import diagnose
 from solver.distributions import compare_with_budget, propagate_distributions
+from solver.error_model import observation_equations
 from solver.errors import SolverError
+from solver.model_comparison import compare_models
 from solver.prior import Prior
 from solver.records import Method
 
@@ -75,9 +78,10 @@ def solved(
     try:
         calibration = calibrate(measured, method, common)
         diagnosis = diagnose(measured, common, _prior(stated))
+        terms = compare_models(observation_equations(measured), measured, common)
     except SolverError as error:
         raise Invalid(problem(error.message.code, error.message.template, **error.message.values)) from error
-    examined = diagnosis_json(diagnosis)
+    examined = {**diagnosis_json(diagnosis), "model": model_json(terms)}
     drawn = _distributions(calibration, stated, report)
     further = {name: examined | drawn.get(name, {}) for name in calibration.answers}
     said = {"uncertainties": dict(stated.uncertainties), "prior": stated.prior}
