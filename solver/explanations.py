@@ -154,7 +154,9 @@ def invisible(session: Session) -> list[Explanation]:
     thresholds = Thresholds(session, (*exact, *turned.values()))
     found = [_by_prior(session, item, thresholds) for item in exact]
     whole = _whole(session, turned)
-    doubtful = [gain > -_PLAUSIBLE for _, gain in whole]
+    # The batch's gain is off by a few units; by itself a fall of χ² must be larger than that to count.
+    least = dict.fromkeys(turned, -_PLAUSIBLE if session.prior is not None else _PLAUSIBLE)
+    doubtful = [gain > least.get(hypothesis.code, _PLAUSIBLE) for hypothesis, gain in whole]
     fitted = iter(session.scores([h for (h, _), fit_it in zip(whole, doubtful, strict=True) if fit_it]))
     for (hypothesis, gain), fit_it in zip(whole, doubtful, strict=True):
         if not fit_it:

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from scipy import special
 
-from solver.current_model import CurrentModel, regressors
+from solver.current_model import CurrentModel, Solutions, regressors
 from solver.hypotheses import Hypothesis
 from solver.hypothesis_fit import UNTOLD, Data, Fitted, fit, other_inputs, rough
 from solver.inputs import CommonUncertainty
@@ -138,11 +138,13 @@ class Session:
         session = cls(
             observations, common, prior, x, model, u, others, told, score, solutions.rest[0], visible
         )
-        session.good = session.scores([None])[0]
+        session.good = session.scores([None], solutions)[0]
         return session
 
-    def scores(self, hypotheses: Sequence[Hypothesis | None]) -> list[Score]:
-        """Fit hypotheses; None is good data."""
+    def scores(
+        self, hypotheses: Sequence[Hypothesis | None], solutions: Solutions | None = None
+    ) -> list[Score]:
+        """Fit hypotheses; None is good data. `solutions`: their fits of `model`, where they are there."""
         if not hypotheses:
             return []
         count, n = len(hypotheses), len(self.x)
@@ -158,7 +160,7 @@ class Session:
                 course[index] = hypothesis.course
         currents, u = self.model.currents[order], self.u[order]
         weights = np.where(missing, 0.0, 1.0 / u**2)
-        solutions = self.model.solve(x, currents, weights, told=self.told)
+        solutions = solutions or self.model.solve(x, currents, weights, told=self.told)
         fits: list[Fitted | None] = [None] * count
         start = solutions.start
         unable = np.isnan(start[:, 0])

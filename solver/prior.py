@@ -9,7 +9,7 @@ takes no part. The squared distance of a fit q̂ of covariance C from it,
 over the parameters that both know, is what joint least squares over data and prior adds to χ².
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -42,6 +42,10 @@ class Prior:
     standard_uncertainties: Array
     covariance: Array | None = None
     source: str = ""
+    says: NDArray[np.bool_] = field(init=False, repr=False)
+    """Parameters that the prior speaks of, (8,)."""
+    matrix: Array = field(init=False, repr=False)
+    """C₀, (8, 8); zero where nothing is said."""
 
     def __post_init__(self) -> None:
         u = self.standard_uncertainties
@@ -59,6 +63,10 @@ class Prior:
                     Message("bad-prior", "The prior of %(name)s needs a value and a positive standard uncertainty.",
                             {"name": name})
                 )  # fmt: skip
+        says = np.isfinite(self.values)
+        matrix = np.diag(np.nan_to_num(u) ** 2) if self.covariance is None else self.covariance
+        object.__setattr__(self, "says", says)
+        object.__setattr__(self, "matrix", np.where(np.outer(says, says), matrix, 0.0))
 
     def with_coupling(self) -> "Prior":
         """The same, with what the names say: a channel's own scale factor outweighs the cross-coupling.
@@ -81,18 +89,6 @@ class Prior:
             covariance,
             self.source,
         )
-
-    @property
-    def says(self) -> NDArray[np.bool_]:
-        """Parameters that the prior speaks of, (8,)."""
-        return np.isfinite(self.values)
-
-    @property
-    def matrix(self) -> Array:
-        """C₀, (8, 8); zero where nothing is said."""
-        if self.covariance is not None:
-            return np.where(np.outer(self.says, self.says), self.covariance, 0.0)
-        return np.diag(np.nan_to_num(self.standard_uncertainties) ** 2)
 
     def distance(self, values: Array, covariance: Array, known: NDArray[np.bool_]) -> tuple[float, int]:
         """D² of a fit and the number of parameters that it compares.

@@ -29,6 +29,10 @@ def number(value: float) -> str:
     return f"{value:.0f}" if 1e4 <= abs(value) < 1e9 else f"{value:.4g}"
 
 
+def _current(current: float) -> str:
+    return f"{ma_from_ampere(current):.7g}"
+
+
 def _rate(rate: float) -> str:
     return f"{deg_per_h_from_rad_per_s(rate):+.3g}"
 
@@ -57,7 +61,7 @@ def verdict(
     shown = {"measure": fall[0], "before": number(fall[1]), "after": number(fall[2])}
     named = {**shown, "positions": places(observations, rows)}
     if code in _IN_THE_FIT:
-        return _in_the_fit(code, observations, rows, details, named)
+        return _in_the_fit(code, observations, rows, details, named, contented=fall[2] >= fall[1])
     return _of_the_session(code, details, shown)
 
 
@@ -72,6 +76,8 @@ def _in_the_fit(
     rows: Sequence[int],
     details: Mapping[str, Any],
     named: dict[str, str],
+    *,
+    contented: bool,
 ) -> Message:
     if code == "outlier":
         return Message(
@@ -95,13 +101,25 @@ def _in_the_fit(
             "falls from %(before)s to %(after)s. Check the stand's indexing and measure this position again.",
             {**named, "actual": place(*details["actual"])},
         )
+    if code == "channel-stuck" and contented:  # so early that the fit is content without it
+        return Message(
+            code,
+            "Channel %(channel)s of the ammeter looks stuck: it shows one and the same value, %(value)s mA, at the "
+            "last of the positions, %(positions)s, which no gyro would. Check the ammeter and measure these "
+            "positions again.",
+            {
+                "channel": details["channel"],
+                "value": _current(details["value"]),
+                "positions": named["positions"],
+            },
+        )
     if code == "channel-stuck":
         return Message(
             code,
             "Channel %(channel)s of the ammeter looks stuck: it shows %(value)s mA at the last of the positions, "
             "%(positions)s. Without these readings %(measure)s falls from %(before)s to %(after)s. Check the "
             "ammeter and measure these positions again.",
-            {**named, "channel": details["channel"], "value": f"{ma_from_ampere(details['value']):.7g}"},
+            {**named, "channel": details["channel"], "value": _current(details["value"])},
         )
     if code == "channel-saturated":
         return Message(
@@ -109,7 +127,7 @@ def _in_the_fit(
             "Channel %(channel)s of the ammeter looks saturated: it shows no more than %(limit)s mA at %(positions)s. "
             "Without these readings %(measure)s falls from %(before)s to %(after)s. Choose a larger range and "
             "measure these positions again.",
-            {**named, "channel": details["channel"], "limit": f"{ma_from_ampere(details['limit']):.7g}"},
+            {**named, "channel": details["channel"], "limit": _current(details["limit"])},
         )
     return Message(
         code,
