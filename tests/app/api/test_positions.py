@@ -169,3 +169,38 @@ def test_a_client_that_goes_away_leaves_nothing(service: Service, session_id: in
         wait_until(lambda: [line for line in lines if line["event"] == "request"])
     assert list(service.lab.settings.uploads.iterdir()) == []
     assert [line for line in lines if line["log_level"] == "error"] == []
+
+
+def test_the_noise_of_a_record(
+    stand: httpx.Client, session_id: int, record_parquet: bytes, currents: dict[str, Any]
+) -> None:
+    made = stand.put(place(session_id, "currents"), content=record_parquet, headers=PARQUET).json()
+    answer = stand.get(place(session_id, "noise"))
+    assert answer.status_code == 200, answer.text
+    noise = answer.json()
+    assert (noise["measurement"], noise["session"], noise["repeat"]) == (made["id"], session_id, 0)
+    assert (noise["jx"]["mean_ma"], noise["jx"]["samples"]) == (
+        pytest.approx(made["jx_ma"], rel=1e-12),
+        12_000,
+    )
+    # The stored u, computed in A instead of mA.
+    assert noise["jx"]["u_ma"] == pytest.approx(made["u_jx_ma"], rel=1e-6)
+    # σ at one sample is the scatter itself, known to 1/√(2·8000) = 0.8 %; four of those.
+    assert noise["jx"]["allan"][0] == pytest.approx(
+        noise["jx"]["allan"][0] | {"tau_s": 0.005, "deviation_ma": 1e-6, "exponent": 0}, rel=0.032
+    )
+    walk = noise["jx"]["coefficients"]["angle_random_walk_ma_sqrt_s"]
+    # 1e-6 mA·√(5 ms), within four of its own uncertainty.
+    assert walk["value"] == pytest.approx(1e-6 * 0.005**0.5, abs=4 * walk["u"])
+    assert noise["jx"]["coefficients"]["angle_random_walk_deg_per_sqrt_h"] is None
+    assert noise["scales_from_calibration"] is None
+    assert [item["code"] for item in noise["jx"]["findings"]] == ["steady"]
+
+
+def test_no_noise_without_a_record(stand: httpx.Client, session_id: int) -> None:
+    missing = stand.get(place(session_id, "noise"))
+    assert (missing.status_code, missing.json()["errors"][0]["code"]) == (404, "not-measured")
+    stand.put(place(session_id, "means"), json=MEANS)
+    typed = stand.get(place(session_id, "noise"))
+    assert (typed.status_code, typed.json()["errors"][0]["code"]) == (404, "no-record")
+    assert stand.get(place(999_999, "noise")).status_code == 404

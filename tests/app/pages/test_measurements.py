@@ -61,7 +61,7 @@ def test_a_brought_record_becomes_a_measurement(stocked: Lab, opened: int, recor
 
 def test_the_page_shows_both_channels_and_keeps_the_spike(technician: TestClient, recorded: int) -> None:
     page = technician.get(f"/measurements/{recorded}").text
-    jx, jy = charts(page)
+    jx, jy, _, _ = charts(page)
     assert len(jx["datasets"]["trace"]) == 800
     assert max(row["h"] for row in jy["datasets"]["trace"]) == -3.0  # µA
     assert "12000 samples" in page
@@ -197,8 +197,59 @@ def test_whoever_only_reads_brings_nothing(designer: TestClient, stocked: Lab, o
     assert not newest(stocked, opened)
 
 
+def row_of(page: str, name: str) -> list[str]:
+    """The cells of the table's row with that head, without markup."""
+    found = re.search(rf"<tr><th scope=\"row\"[^>]*>(?:<i>\w</i> )?{re.escape(name)}</th>(.*?)</tr>", page)
+    assert found, name
+    return [re.sub("<[^>]*>", "", cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", found[1])]
+
+
+def test_the_page_shows_the_noise_of_both_channels(technician: TestClient, recorded: int) -> None:
+    """White noise of 10 nA: u is 10 nA/√12000 = 0.091 nA, N is 10 nA·√5 ms = 0.707 nA·√s."""
+    page = technician.get(f"/measurements/{recorded}").text
+    unit, x, _ = row_of(page, "u of the mean, as stated (slow fluctuations)")
+    assert unit == "nA"
+    # u is known to some 10 %: three of these.
+    assert float(x.split()[0]) == pytest.approx(0.0913, rel=0.3)
+    assert row_of(page, "Effective samples")[1].endswith(" of 12000")
+    unit, x, _ = row_of(page, "Angle random walk")
+    assert (unit, float(x.split()[0])) == ("nA·√s", pytest.approx(0.707, abs=0.03))
+    assert row_of(page, "Rate random walk")[1].startswith("≤ ")
+    assert "no result yet" in page
+    _, _, allan, correlation = charts(page)
+    assert len(allan["datasets"]["points_x"]) == 13  # 1, 2, …, 4096 of 12,000 samples.
+    assert allan["datasets"]["duration"] == [{"t": 60.0, "text": "mean over 60 s"}]
+    assert correlation["datasets"]["x"][0] == {"t": 0.0, "v": 1.0}
+
+
+def test_a_channel_that_drifts_and_one_that_is_stuck(
+    technician: TestClient, stocked: Lab, opened: int
+) -> None:
+    known = record()
+    drifting = known.jx_ma + np.linspace(0.0, 1e-5, 12_000)
+    made = CurrentRecord(90.0, 180.0, known.t_s, drifting, np.full(12_000, -4e-3))
+    bring(technician, opened, ("one.parquet", write_record_parquet(made)))
+    page = technician.get(f"/measurements/{newest(stocked, opened)[90.0, 180.0].id}").text
+    assert "The current drifts" in page
+    assert "Every sample is the same" in page
+    # 10 nA in a minute.
+    assert float(row_of(page, "Slope")[1].split()[0]) == pytest.approx(10.0, abs=1.5)
+    assert row_of(page, "Slope")[2] == "–"
+
+
+def test_a_short_record_shows_what_it_can(technician: TestClient, stocked: Lab, opened: int) -> None:
+    known = record()
+    made = CurrentRecord(90.0, 180.0, known.t_s[:40], known.jx_ma[:40], known.jy_ma[:40])
+    bring(technician, opened, ("one.parquet", write_record_parquet(made)))
+    page = technician.get(f"/measurements/{newest(stocked, opened)[90.0, 180.0].id}").text
+    assert "too short to judge" in page
+    assert "Angle random walk" not in page
+
+
 def test_in_russian(technician: TestClient, recorded: int) -> None:
     technician.cookies.set("lang", "ru")
     page = technician.get(f"/measurements/{recorded}").text
     assert "Средние токи" in page
     assert "Запись" in page
+    assert "Девиация Аллана" in page
+    assert "Запись стационарна" in page

@@ -75,7 +75,24 @@ def record_chart():
     return plots.record([0.0, 0.5, 1.0], [1.0, 0.9, 1.0], [1.1, 1.9, 1.2], "x", 1.05, stretches, "Record")
 
 
+def allan_chart():
+    points = [
+        plots.AllanPoint(axis, tau, 10.0 / tau**0.5, 9.0 / tau**0.5, 12.0 / tau**0.5, f"{axis} at {tau} s")
+        for axis in ("x", "y")
+        for tau in (0.005, 0.01, 0.1, 1.0, 10.0)
+    ]
+    means = [plots.MeanPoint("x", 1.3, "u of x"), plots.MeanPoint("y", 1.4, "u of y")]
+    return plots.allan(points, means, [("x", [(0.005, 141.0), (60.0, 1.3)])], 60.0, "mean over 60 s", "Allan")
+
+
+def correlation_chart():
+    curve = [(0.0, 1.0), (0.005, 0.4), (0.01, -0.1)]
+    return plots.autocorrelation(curve, curve[:2], 0.02, "Autocorrelation")
+
+
 CHARTS = {
+    "allan": allan_chart,
+    "autocorrelation": correlation_chart,
     "residuals": residual_chart,
     "drift": drift_chart,
     "convergence": convergence_chart,
@@ -219,3 +236,27 @@ def test_one_request_leaves_nothing_to_the_next():
     first = json.dumps(residual_chart())
     plots.residuals(residual_points(None), PLACES[:3], 0, "Others", "beyond")
     assert json.dumps(residual_chart()) == first
+
+
+def test_every_allan_deviation_and_both_uncertainties_are_drawn():
+    drawing = drawn(allan_chart())
+    named = set(re.findall(r'aria-label="([xy] at [0-9.]+ s|u of [xy])"', drawing))
+    assert len(named) == 12
+    assert "mean over 60 s" in drawing
+
+
+def test_the_axes_of_allan_deviations_name_decades():
+    labels = re.findall(r">(0\.01|0\.1|1|10|100|20|50)<", drawn(allan_chart()))
+    assert {"0.01", "0.1", "1", "10"} <= set(labels)
+
+
+def test_an_allan_deviation_of_zero_is_not_on_a_logarithmic_axis():
+    spec = plots.allan([plots.AllanPoint("x", 1.0, 0.0, 0.0, 0.0, "none")], [], [], 60.0, "60 s", "Allan")
+    assert spec["datasets"]["points_x"] == []
+    drawn(spec)
+
+
+def test_a_channel_without_autocorrelation_leaves_its_line_out():
+    spec = plots.autocorrelation([(0.0, 1.0), (0.1, 0.0)], [], 0.02, "Autocorrelation")
+    assert spec["datasets"]["y"] == []
+    drawn(spec)
