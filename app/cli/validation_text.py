@@ -78,11 +78,15 @@ def _explain(console: Console, case: Mapping[str, Any], checks: Sequence[Mapping
         table.add_column(name, justify="right" if name in ("expected", "obtained", "digits") else "left")
     for check in checks:
         table.add_row(
-            "  " + escape(check["name"]), _value(check["expected"]), _value(check["obtained"]),
+            "  " + escape(_named(check)), _value(check["expected"]), _value(check["obtained"]),
             check["unit"], _digits(check["digits"]), _accepted(check), _WORDS[check["verdict"]],
         )  # fmt: skip
     console.print(table if checks else "")
     console.print()
+
+
+def _named(check: Mapping[str, Any]) -> str:
+    return f"{check['name']}, {check['detail']}" if check["detail"] else str(check["name"])
 
 
 def _value(value: float | str | None) -> str:

@@ -88,7 +88,7 @@ def group(progress: Progress, full: bool, seed: int) -> Group:
     error = ""
     try:
         for number in range(count):
-            progress(0.1 + 0.9 * number / count, f"{number} of {count}")
+            progress(0.1 + 0.9 * number / count, _TITLE)
             held += _session(np.random.default_rng([seed, 2, number]), methods, None if full else stated[1:])
     except Exception as reason:  # told in the report: the other suites go on
         error = f"{type(reason).__name__}: {reason}"
@@ -109,6 +109,7 @@ def group(progress: Progress, full: bool, seed: int) -> Group:
 
 
 _TITLE: Final = marked("Coverage of 95 % intervals")
+_RECORDS_NAME: Final = marked("Means of autocorrelated records")
 _FUNCTION: Final = "solver.calibrate.calibrate, Calibration.budget"
 _NAMES: Final = {
     "least-squares": marked("Parameters by least squares"),
@@ -156,7 +157,7 @@ def _stated_of_records(progress: Progress, seed: int) -> tuple[Array, Array, Arr
     rng = np.random.default_rng([seed, 1])
     found: list[Array] = []
     for start in range(0, _RECORDS, 32):
-        progress(0.1 * start / _RECORDS, "records")
+        progress(0.1 * start / _RECORDS, _RECORDS_NAME)
         found.append(_from_records(rng, 32))
     means, u, dof = np.concatenate(found, axis=1)
     return means, u, dof
@@ -173,7 +174,7 @@ def _of_means(stated: tuple[Array, Array, Array]) -> Case:
     held = float(np.mean(np.abs(means) <= coverage_factor(dof, LEVEL) * u))
     low, high = binomial_range(len(means), 1)
     return Case(
-        marked("Means of autocorrelated records"),
+        _RECORDS_NAME,
         marked("Driftbook’s own: records of 60 s at 200 Hz, white noise and noise correlated over 0.1 s"),
         "solver.noise.mean_with_uncertainty",
         (in_range(marked("share of intervals that hold the true mean"), LEVEL, held, low, high),),

@@ -13,6 +13,7 @@ from solver.records import Array
 from solver.uncertainty import coverage_factor, propagate
 from solver.variance_components import from_summaries
 
+_TITLE: Final = marked("GUM: uncertainty to first order")
 _ROUNDED_ON_THE_WAY: Final = 1.0
 """Tolerance, in units of the last place, where the GUM goes on with values that it has rounded."""
 _PAIRS: Final = ((0, 1), (0, 2), (1, 2))
@@ -21,7 +22,7 @@ _PAIRS: Final = ((0, 1), (0, 2), (1, 2))
 def group(progress: Progress) -> Group:
     """Compute every example."""
     data = load("gum")
-    progress(0.0, "GUM, H")
+    progress(0.0, _TITLE)
     cases = (
         attempt(
             marked("H.1: end gauge, effective degrees of freedom"),
@@ -51,7 +52,7 @@ def group(progress: Progress) -> Group:
             "solver.uncertainty.coverage_factor", lambda: _student(data["g2"]),
         ),
     )  # fmt: skip
-    return Group("gum", marked("GUM: uncertainty to first order"), cases)
+    return Group("gum", _TITLE, cases)
 
 
 def _end_gauge(data: Mapping[str, Any]) -> Iterator[Check]:
@@ -104,7 +105,7 @@ def _thermometer(data: Mapping[str, Any]) -> Iterator[Check]:
     yield as_printed("y₂", data["y2"], values[1])
     yield as_printed("u(y₂)", data["u_y2"], found.standard_uncertainties[1])
     yield as_printed("r(y₁, y₂)", data["r"], found.correlation[0, 1])
-    yield as_printed("s", data["s"], s, "°C")
+    yield as_printed("s(b)", data["s"], s, "°C")
     for number, printed in enumerate(data["predicted_c"]):
         yield as_printed(f"b(t{number + 1})", printed, values[0] + values[1] * (t[number] - 20.0), "°C")
     at_30 = propagate([1.0, 10.0], covariance, np.full(2, len(t) - 2.0))
@@ -134,7 +135,7 @@ def _zener(data: Mapping[str, Any]) -> Iterator[Check]:
     yield as_printed("F", data["f"], found.f, last_place=1.5)
     yield as_printed("s_B", data["s_between"], found.variance_between**0.5, "µV")
     yield as_printed("u(V̄)", data["u_mean"], found.u_mean, "µV")
-    yield as_printed(marked("u(V̄), days alike"), data["u_pooled"], found.u_mean_pooled, "µV")
+    yield as_printed("u(V̄)", data["u_pooled"], found.u_mean_pooled, "µV", detail=marked("days alike"))
     # F lies between F₀.₉₅(9, 40) = 2.12 and F₀.₉₇₅(9, 40) = 2.45
     yield in_range("p(F)", "0.037", found.p_value, 0.025, 0.05)
 

@@ -24,9 +24,15 @@ from solver.uncertainty import propagate
 _RUN: Final = "solver.monte_carlo.run"
 _COMPARED: Final = "solver.monte_carlo.run, solver.uncertainty.propagate, solver.comparison.compare"
 _STABLE: Final = 2.0 / 5.0
+_FIRST: Final = marked("GUM, first order")
+_COMPARISON: Final = marked("comparison with the GUM")
+_AGREE, _DISAGREE = marked("agree"), marked("disagree")
+_ENDS: Final = {
+    "symmetric": (marked("symmetric interval, lower end"), marked("symmetric interval, upper end")),
+    "shortest": (marked("shortest interval, lower end"), marked("shortest interval, upper end")),
+}
 _SHORTEST: Final = {0.95: 0.05, 0.99: 0.10}
 _LENGTH: Final = 0.02
-_FORM: Final = "JCGM 101:2008, %s; https://www.bipm.org/en/committees/jc/jcgm/publications"
 
 
 def group(progress: Progress, seed: int) -> Group:
@@ -34,27 +40,54 @@ def group(progress: Progress, seed: int) -> Group:
     data = load("jcgm101")
     trials = int(data["trials"])
     draw = partial(run, trials=trials, seed=seed)
-    cases = [
-        (marked("9.2.2: sum of four normal quantities"), _FORM % "9.2.2, table 2", _COMPARED,
-         lambda: _additive(data["additive"]["normal"], draw, normal=True)),
-        (marked("9.2.3: sum of four rectangular quantities"), _FORM % "9.2.3, table 3", _COMPARED,
-         lambda: _additive(data["additive"]["rectangular"], draw)),
-        (marked("9.2.4: sum of rectangular quantities, one ten times as wide"), _FORM % "9.2.4, table 4", _COMPARED,
-         lambda: _additive(data["additive"]["unequal"], draw)),
-        (marked("9.3: calibration of a mass standard"), _FORM % "9.3, tables 5 and 6", _COMPARED,
-         lambda: _mass(data["mass"], draw)),
-        (marked("9.4: comparison loss of a power meter, uncorrelated and correlated"),
-         _FORM % "9.4, tables 8 and 9", _RUN, lambda: _loss(data["loss"], draw)),
-        (marked("9.5: gauge block, 99 %"), _FORM % "9.5, tables 10 and 11", _RUN,
-         lambda: _gauge(data["gauge"], draw)),
-    ]  # fmt: skip
+    additive = data["additive"]
+    computed: tuple[Callable[[], Iterator[Check]], ...] = (
+        lambda: _additive(additive["normal"], draw, normal=True),
+        lambda: _additive(additive["rectangular"], draw),
+        lambda: _additive(additive["unequal"], draw),
+        lambda: _mass(data["mass"], draw),
+        lambda: _loss(data["loss"], draw),
+        lambda: _gauge(data["gauge"], draw),
+    )
     found = []
-    for number, (name, source, function, compute) in enumerate(cases):
-        progress(number / len(cases), name)
+    for number, ((name, source, function), compute) in enumerate(zip(_CASES, computed, strict=True)):
+        progress(number / len(_CASES), name)
         found.append(attempt(name, source, function, compute, _NOTE))
     return Group("jcgm101", marked("JCGM 101: propagation of distributions"), tuple(found))
 
 
+_CASES: Final = (
+    (
+        marked("9.2.2: sum of four normal quantities"),
+        marked("JCGM 101:2008, 9.2.2, table 2; https://www.bipm.org/en/committees/jc/jcgm/publications"),
+        _COMPARED,
+    ),
+    (
+        marked("9.2.3: sum of four rectangular quantities"),
+        marked("JCGM 101:2008, 9.2.3, table 3; https://www.bipm.org/en/committees/jc/jcgm/publications"),
+        _COMPARED,
+    ),
+    (
+        marked("9.2.4: sum of rectangular quantities, one ten times as wide"),
+        marked("JCGM 101:2008, 9.2.4, table 4; https://www.bipm.org/en/committees/jc/jcgm/publications"),
+        _COMPARED,
+    ),
+    (
+        marked("9.3: calibration of a mass standard"),
+        marked("JCGM 101:2008, 9.3, tables 5 and 6; https://www.bipm.org/en/committees/jc/jcgm/publications"),
+        _COMPARED,
+    ),
+    (
+        marked("9.4: comparison loss of a power meter, uncorrelated and correlated"),
+        marked("JCGM 101:2008, 9.4; https://www.bipm.org/en/committees/jc/jcgm/publications"),
+        _RUN,
+    ),
+    (
+        marked("9.5: gauge block, 99 %"),
+        marked("JCGM 101:2008, 9.5; https://www.bipm.org/en/committees/jc/jcgm/publications"),
+        _RUN,
+    ),
+)
 _NOTE: Final = marked(
     "A million draws. Accepted is half a unit of the last printed place and 2/5 of the numerical tolerance δ "
     "(7.9.2), for the document’s run and ours. Ends of shortest intervals scatter more: 0.05·u, at 99 % 0.1·u; "
@@ -77,12 +110,12 @@ def _additive(data: Mapping[str, Any], draw: Draw, *, normal: bool = False) -> I
     first = propagate(np.ones(len(widths)), np.diag(widths**2))
     if "gum" in data:
         for name, printed, sign in zip(("y − U", "y + U"), data["gum"], (-1, 1), strict=True):
-            yield as_printed(f"{name}, GUM", printed, sign * float(first.expanded()[0]))
+            yield as_printed(name, printed, sign * float(first.expanded()[0]), detail=_FIRST)
     verdict = compare(
         found, np.zeros(1), first.standard_uncertainties, first.expanded(), names=("Y",)
     ).verdict
-    expected = "disagree" if "gum" in data else "agree"
-    yield holds(marked("comparison with the GUM, two digits"), expected, verdict)
+    expected = _DISAGREE if "gum" in data else _AGREE
+    yield holds(_COMPARISON, expected, verdict, marked("two digits"))
 
 
 def _mass(data: Mapping[str, Any], draw: Draw) -> Iterator[Check]:
@@ -101,13 +134,14 @@ def _mass(data: Mapping[str, Any], draw: Draw) -> Iterator[Check]:
     # At the estimates buoyancy vanishes with the air's deviation: only the two masses count to first order.
     first = propagate([1.0, 1.0], np.diag([data["reference"][1] ** 2, data["added"][1] ** 2]))
     value = np.array([data["reference"][0] + data["added"][0] - nominal])
-    yield as_printed("u(δm), GUM", data["u_first_order"], first.standard_uncertainties[0], "mg")
+    yield as_printed("u(δm)", data["u_first_order"], first.standard_uncertainties[0], "mg", detail=_FIRST)
     for name, printed, sign in zip(("δm − U", "δm + U"), data["gum_first_order"], (-1, 1), strict=True):
-        yield as_printed(f"{name}, GUM", printed, float(value[0]) + sign * float(first.expanded()[0]), "mg")
+        end = float(value[0]) + sign * float(first.expanded()[0])
+        yield as_printed(name, printed, end, "mg", detail=_FIRST)
     verdict = compare(
         found, value, first.standard_uncertainties, first.expanded(), digits=1, names=("δm",)
     ).verdict
-    yield holds(marked("comparison with the GUM, one digit"), "disagree", verdict)
+    yield holds(_COMPARISON, _DISAGREE, verdict, marked("one digit"))
 
 
 def _loss(data: Mapping[str, Any], draw: Draw) -> Iterator[Check]:
@@ -174,20 +208,21 @@ def _spread(data: Mapping[str, Any], found: MonteCarlo, name: str, digits: int =
         yield _near(f"y({name})", data["y"], found.mean[0], stable, unit)
     yield _near(f"u({name})", data["u"], u, stable, unit)
     for kind, reach in (("symmetric", stable), ("shortest", max(stable, _SHORTEST[found.level] * u))):
-        for end, printed, value in zip(
-            ("low", "high"), data.get(kind, ()), getattr(found, kind)[0], strict=False
-        ):
-            yield _near(f"{name}, {kind} {end}", printed, value, reach, unit)
+        ends = getattr(found, kind)[0]
+        for detail, printed, value in zip(_ENDS[kind], data.get(kind, ()), ends, strict=False):
+            yield _near(name, printed, value, reach, unit, detail)
     if "shortest" in data:
         low, high = data["shortest"]
         length = f"{float(high) - float(low):.{_places(high)}f}"
         obtained = float(np.diff(found.shortest[0])[0])
-        yield _near(f"{name}, shortest, length", length, obtained, _LENGTH * u + _half(high), unit)
+        yield _near(
+            name, length, obtained, _LENGTH * u + _half(high), unit, marked("shortest interval, length")
+        )
 
 
-def _near(name: str, printed: str, obtained: float, reach: float, unit: str) -> Check:
+def _near(name: str, printed: str, obtained: float, reach: float, unit: str, detail: str = "") -> Check:
     expected, reach = float(printed), reach + _half(printed)
-    return in_range(name, printed, float(obtained), expected - reach, expected + reach, unit)
+    return in_range(name, printed, float(obtained), expected - reach, expected + reach, unit, detail)
 
 
 def _places(printed: str) -> int:

@@ -1,7 +1,7 @@
 """The NBS14 suites: Allan deviations of nine and of a thousand numbers, to the printed digits."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -11,11 +11,13 @@ from app.validation.report import Check, Group, Progress, as_printed, attempt
 from solver.allan import allan_deviation
 from solver.records import Array
 
+_TITLE: Final = marked("NBS14: Allan deviation")
+
 
 def group(progress: Progress) -> Group:
     """Compute both suites."""
     data = load("allan")
-    progress(0.0, "NBS14")
+    progress(0.0, _TITLE)
     function = "solver.allan.allan_deviation"
     cases = (
         attempt(
@@ -29,7 +31,7 @@ def group(progress: Progress) -> Group:
             function, lambda: _suite(data["thousand"], generated(data["thousand"])),
         ),
     )  # fmt: skip
-    return Group("nbs14", marked("NBS14: Allan deviation"), cases)
+    return Group("nbs14", _TITLE, cases)
 
 
 def generated(data: Mapping[str, Any]) -> Array:
@@ -41,7 +43,7 @@ def generated(data: Mapping[str, Any]) -> Array:
 
 
 def _suite(data: Mapping[str, Any], samples: Array) -> Iterator[Check]:
-    for kind, name in (("plain", "σ(τ = {})"), ("overlapping", "σ(τ = {}), {}")):
+    for kind, detail in (("plain", ""), ("overlapping", marked("overlapping"))):
         found = allan_deviation(samples, data["factors"], overlapping=kind == "overlapping")
         for factor, printed, value in zip(data["factors"], data[kind], found, strict=True):
-            yield as_printed(name.format(factor, kind), printed, value)
+            yield as_printed(f"σ(τ = {factor})", printed, value, detail=detail)

@@ -81,7 +81,7 @@ def _as_stated(problem: Mapping[str, Any]) -> Iterator[Check]:
     in_batch = solve_batch(np.stack((design, design)), np.stack((y, y)))[0][1]
     for name, values in (("estimate", by_qr), ("solve_batch", in_batch)):
         for index, (value, certified) in enumerate(zip(values, problem["estimates"], strict=True)):
-            yield by_digits(f"{_coefficient(problem, index)} ({name})", certified, value, required)
+            yield by_digits(_coefficient(problem, index), certified, value, required, detail=name)
 
 
 def _centred(problem: Mapping[str, Any]) -> Iterator[Check]:
@@ -124,7 +124,7 @@ def _certified(
         yield by_digits(_coefficient(problem, index), certified, value, required)
     for index, (value, certified) in enumerate(zip(deviations, problem["standard_deviations"], strict=True)):
         yield by_digits(f"s({_coefficient(problem, index)})", certified, value, required)
-    yield by_digits("s", problem["residual_sd"], variance**0.5, required)
+    yield by_digits("s(y)", problem["residual_sd"], variance**0.5, required)
     yield by_digits("R²", problem["r_squared"], 1.0 - residual / float(about @ about), required)
 
 

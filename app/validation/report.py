@@ -32,6 +32,8 @@ class Check:
     passed
     unit
         Empty for pure numbers.
+    detail
+        Which of several values of the quantity: a method, an end of an interval.
     digits
         How many digits agree; None where that says nothing.
     required
@@ -45,6 +47,7 @@ class Check:
     obtained: float | str
     passed: bool
     unit: str = ""
+    detail: str = ""
     digits: float | None = None
     required: float | None = None
     low: float | None = None
@@ -154,13 +157,17 @@ def digits_agreed(obtained: float, expected: float) -> float:
     return MOST_DIGITS if error == 0 else min(MOST_DIGITS, max(0.0, -log10(error)))
 
 
-def by_digits(name: str, expected: float, obtained: float, required: float, unit: str = "") -> Check:
+def by_digits(
+    name: str, expected: float, obtained: float, required: float, unit: str = "", detail: str = ""
+) -> Check:
     """Check that so many digits agree."""
     digits = digits_agreed(float(obtained), expected)
-    return Check(name, expected, float(obtained), digits >= required, unit, digits, required)
+    return Check(name, expected, float(obtained), digits >= required, unit, detail, digits, required)
 
 
-def as_printed(name: str, printed: str, obtained: float, unit: str = "", last_place: float = 0.5) -> Check:
+def as_printed(
+    name: str, printed: str, obtained: float, unit: str = "", last_place: float = 0.5, detail: str = ""
+) -> Check:
     """Check against a value as it is printed: the obtained one must round to it.
 
     `last_place` is the tolerance in units of the last printed place; more than a half where the
@@ -170,21 +177,27 @@ def as_printed(name: str, printed: str, obtained: float, unit: str = "", last_pl
     unit_of_last = 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
     expected = float(printed)
     reach = last_place * unit_of_last * (1 + 1e-9)
-    return in_range(name, printed, obtained, expected - reach, expected + reach, unit)
+    return in_range(name, printed, obtained, expected - reach, expected + reach, unit, detail)
 
 
 def in_range(
-    name: str, expected: float | str, obtained: float, low: float, high: float, unit: str = ""
+    name: str,
+    expected: float | str,
+    obtained: float,
+    low: float,
+    high: float,
+    unit: str = "",
+    detail: str = "",
 ) -> Check:
     """Check that a number lies in a range; the digits agreed are told, but do not decide."""
     obtained = float(obtained)
     digits = digits_agreed(obtained, float(expected))
-    return Check(name, expected, obtained, low <= obtained <= high, unit, digits, None, low, high)
+    return Check(name, expected, obtained, low <= obtained <= high, unit, detail, digits, None, low, high)
 
 
-def holds(name: str, expected: str, obtained: str) -> Check:
+def holds(name: str, expected: str, obtained: str, detail: str = "") -> Check:
     """Check that words are the expected ones."""
-    return Check(name, expected, obtained, obtained == expected)
+    return Check(name, expected, obtained, obtained == expected, detail=detail)
 
 
 def attempt(

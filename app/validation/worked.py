@@ -39,6 +39,7 @@ _SIMULATOR_DIGITS: Final = 12.0
 _SOURCE: Final = marked(
     "Driftbook’s own: currents of a known gyro in arithmetic of fifty digits, orientations by Rodrigues’ formula"
 )
+_SQUARES, _PAPER = marked("least squares"), marked("paper’s iteration")
 _FUNCTION: Final = "solver.calibrate.calibrate"
 _NAMES: Final = {
     "moscow": marked("Sixteen positions, Moscow (55.76° N)"),
@@ -53,7 +54,7 @@ def group(progress: Progress) -> Group:
     """Solve every case."""
     cases: list[Case] = []
     for case in load("worked")["cases"]:
-        progress(len(cases) / (len(_NAMES) + 1), case["key"])
+        progress(len(cases) / (len(_NAMES) + 1), _NAMES[case["key"]])
         compute = _answers if "least_squares" in case else _truth
         cases.append(
             attempt(
@@ -85,7 +86,7 @@ def observations_of(case: Mapping[str, Any], order: NDArray[np.int64] | None = N
 def _truth(case: Mapping[str, Any]) -> Iterator[Check]:
     found = calibrate(observations_of(case), "both")
     truth = [case["truth"][name] for name in PARAMETERS]
-    for method, estimate in (("least-squares", found.least_squares), ("paper", found.paper)):
+    for method, estimate in ((_SQUARES, found.least_squares), (_PAPER, found.paper)):
         yield from _parameters(method, truth, _lab(_answer(estimate).values), _DIGITS)
     yield from _simulated(case)
 
@@ -99,26 +100,30 @@ def _simulated(case: Mapping[str, Any]) -> Iterator[Check]:
     for name, stored, simulated in zip("xy", rows[:, 5:].T, steady_currents(bench, places), strict=True):
         worst = int(np.argmax(np.abs(simulated / ampere_from_ma(stored) - 1.0)))
         yield by_digits(
-            f"J{name}, simdevice",
+            f"J{name}",
             float(stored[worst]),
             float(simulated[worst]) * 1e3,
             _SIMULATOR_DIGITS,
             "mA",
+            "simdevice",
         )
 
 
 def _answers(case: Mapping[str, Any]) -> Iterator[Check]:
     found = calibrate(observations_of(case), "both")
     squares, paper = _answer(found.least_squares), _answer(found.paper)
-    yield from _parameters("least-squares", case["least_squares"], _lab(squares.values), _DIGITS)
+    yield from _parameters(_SQUARES, case["least_squares"], _lab(squares.values), _DIGITS)
     yield from _parameters(
-        "u, least-squares", case["standard_uncertainties"], _lab(squares.standard_uncertainties), _DIGITS
+        marked("u, least squares"),
+        case["standard_uncertainties"],
+        _lab(squares.standard_uncertainties),
+        _DIGITS,
     )
-    yield from _parameters("paper", case["paper"], _lab(paper.values), _DIGITS)
+    yield from _parameters(_PAPER, case["paper"], _lab(paper.values), _DIGITS)
     differences = np.array(case["paper"]) - np.array(case["least_squares"])
     # A difference of two numbers that agree to about three digits has three digits fewer than they.
     yield from _parameters(
-        "paper − least-squares", differences, _lab(paper.values - squares.values), _DIGITS - 3
+        marked("iteration − least squares"), differences, _lab(paper.values - squares.values), _DIGITS - 3
     )
 
 
@@ -129,8 +134,8 @@ def _same_bits(case: Mapping[str, Any]) -> Iterator[Check]:
         (marked("again"), first),
         (marked("rows in another order"), observations_of(case, order)),
     ):
-        yield holds(name, _digest(first), _digest(second))
-        yield holds("input_hash", first.input_hash(), second.input_hash())
+        yield holds("SHA-256", _digest(first), _digest(second), name)
+        yield holds("input_hash", first.input_hash(), second.input_hash(), name)
 
 
 def _digest(observations: Observations) -> str:
@@ -152,7 +157,7 @@ def _answer(estimate: object) -> Estimate:
 
 def _parameters(kind: str, expected: Any, obtained: Array, required: float) -> Iterator[Check]:
     for name, unit, truth, value in zip(PARAMETERS, _UNITS, expected, obtained, strict=True):
-        yield by_digits(f"{name} ({kind})", float(truth), float(value), required, unit)
+        yield by_digits(name, float(truth), float(value), required, unit, kind)
 
 
 def _lab(values: Array) -> Array:

@@ -50,13 +50,24 @@ def test_a_report_in_text_holds_every_check(driftbook, monkeypatch, tmp_path):
     assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))["verdict"] == "pass"
 
 
+def test_a_report_as_a_page_of_its_own(driftbook, monkeypatch, tmp_path):
+    only_nist(monkeypatch)
+    assert driftbook("validate", "--report", tmp_path / "report.html").code == 0
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert text.startswith("<!doctype html>")
+    assert "All 12 cases passed." in text
+    assert text.count("<details") == text.count(" open>") == 12
+    assert "<link" not in text  # it stands alone: the stylesheet is inside, nothing is fetched
+    assert "<script" not in text
+
+
 def test_what_fails_is_shown_and_ends_with_1(driftbook, monkeypatch):
     only_nist(monkeypatch)
     monkeypatch.setattr(nist, "estimate", lambda design, y: (np.zeros(design.shape[1]), None))
     done = driftbook("validate")
     assert done.code == 1
     assert "11 of 12 cases failed" in done.out  # all but the centred one, which is not solved that way
-    assert "B0 (estimate)" in done.out
+    assert "B0, estimate" in done.out
 
 
 def test_a_report_of_an_unknown_kind_is_refused_before_anything_runs(driftbook, tmp_path):
