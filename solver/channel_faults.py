@@ -22,6 +22,7 @@ _RELATIVE: Final = 1e-4
 _HALF_CLIPPED: Final = 0.1
 _DIFFERENT: Final = 0.1
 _SURE_RUN: Final = 3
+_ALIVE: Final = 10.0
 
 
 def stuck_channels(observations: Observations) -> Iterator[Hypothesis]:
@@ -55,16 +56,13 @@ def surely_stuck(observations: Observations, x: Array, *, visible: bool) -> str:
     found = ""
     for channel, name in enumerate("xy"):
         currents, tolerance = _channel(observations, channel)
-        for allowed, least in (
-            (None, _SURE_RUN),
-            (tolerance[order], max(_SURE_RUN, len(order) - REGRESSORS)),
-        ):
-            run = order[_run(currents[order], allowed) :]
-            if (
-                len(run) >= least
-                and np.ptp(x[run], axis=0).max() > _DIFFERENT
-                and (allowed is None or not visible)
-            ):
+        other, quiet = _channel(observations, 1 - channel)
+        exact = order[_run(currents[order], None) :]
+        near = order[_run(currents[order], tolerance[order]) :]
+        early = len(near) >= max(_SURE_RUN, len(order) - REGRESSORS) and not visible
+        alive = np.ptp(other[near]) > _ALIVE * quiet.max()  # so the noise is not larger than all currents
+        for run, sure in ((exact, len(exact) >= _SURE_RUN), (near, early and alive)):
+            if sure and np.ptp(x[run], axis=0).max() > _DIFFERENT:
                 found += name
                 break
     return found

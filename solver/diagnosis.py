@@ -20,7 +20,7 @@ missing it is as improbable.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -48,6 +48,8 @@ UNEXPLAINED_LEVEL: Final = 1e-6
 EQUIVALENT: Final = 9.2
 """2·ln 100: odds of less than a hundred to one."""
 _LEAST_POSITIONS: Final = 2
+_OVERSTATED: Final = 1e-3
+"""χ² over its freedom below which the stated noise is of no use: u(J) in another unit than J, perhaps."""
 _MOST_EQUIVALENT: Final = 6
 _APART: Final = 3.0
 
@@ -106,6 +108,9 @@ def diagnose(
     if len(observations) < _LEAST_POSITIONS:
         return Diagnosis()
     session = Session.of(observations, common, None if prior is None else prior.with_coupling())
+    best = session.good.best
+    if session.told and best.dof > 0 and best.variance < _OVERSTATED:
+        return diagnose(replace(observations, u_jx=None, u_jy=None), common, prior)
     explanations = invisible(session)
     suspicion = suspect(session)
     if suspicion.search or surely_stuck(observations, session.x, visible=session.visible):

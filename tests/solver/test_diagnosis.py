@@ -296,6 +296,19 @@ def test_noise_larger_than_stated_is_no_blunder(rng):
         assert codes(diagnose(understated)) == ["unexplained"]
 
 
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+def test_a_wrong_unit_of_the_currents_but_not_of_their_u(factor, rng):
+    """u(J) is then a thousand times too large, or too small: the prior tells all the same."""
+    session = Study().draw(rng)
+    made = session.written(session.currents() / factor)
+    assert right(diagnose(made, prior=prior()), Truth("current-unit", (), {"factor": factor}))
+
+
+def test_noise_as_large_as_the_currents_is_no_stuck_channel(rng):
+    for _ in range(10):
+        assert not diagnose(good(Study(noise=20.0).draw(rng))[0], prior=prior()).findings
+
+
 def test_two_blunders_are_not_made_one(rng):
     for _ in range(10):
         currents = (session := Study().draw(rng)).currents()
