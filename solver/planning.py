@@ -19,16 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.budget import Budget, make_budget
-from solver.constants import EARTH_RATE
 from solver.error_model import currents, observation_equations, scale_matrix
 from solver.errors import InputError, Message
 from solver.geometry import Elements, case_orientation, elements
 from solver.inputs import CommonUncertainty, inputs_of
 from solver.least_squares import solve
 from solver.measurement_rule import LEAST_DURATION, RULE_TOLERANCE
-from solver.observability import find_invisible, names, natural_scale, unobservable
+from solver.observability import find_invisible, natural_scale, unobservable
+from solver.plan_words import WEAK, undetermined, weak
 from solver.records import Array, Observations
-from solver.units import deg_per_h_from_rad_per_s
 
 FEWEST: Final = 4
 """Positions that give as many equations as there are parameters."""
@@ -219,11 +218,13 @@ def predict(places: Places, duration: float, at: Circumstances) -> Prediction:
     gain = (solution.gain.reshape(-1, len(places), 2) @ whitening).reshape(len(solution.gain), -1)
     inputs = inputs_of(observations, at.parameters, at.common)
     effect = gain @ inputs.sensitivity
-    blank, rank, warnings = _undetermined(
+    blank, rank, warnings = undetermined(
         invisible.parameters, 8 - len(invisible.directions), effect @ inputs.covariance @ effect.T
     )
     if invisible.parameters.any():
         warnings = (unobservable(invisible), *warnings)
+    elif not blank.any() and solution.condition > WEAK:
+        warnings = (weak(solution, natural_scale(equations.design), len(places)),)
     if below_method(duration):
         warnings += (
             Message("below-method", "Each position is measured for %(duration).3g s; the method asks for "
@@ -253,29 +254,3 @@ def _as_observed(places: Places, duration: float, at: Circumstances) -> Observat
 def elements_at(places: Places) -> Elements:
     """Elements of (14) at each place, (n,)."""
     return elements(case_orientation(places.theta, places.psi, places.alpha, places.beta, places.gamma))
-
-
-def _undetermined(
-    invisible: NDArray[np.bool_], rank: int, covariance: Array
-) -> tuple[NDArray[np.bool_], int, tuple[Message, ...]]:
-    """Parameters to leave blank, the rank, and the words for drifts vaguer than the Earth rate.
-
-    The same judgement as of a measured session (`solver.estimation`): at θ = 0 alone, arcseconds of
-    certified misalignment are all that the g-sensitive drifts show by.
-    """
-    variances = np.where(invisible, 0.0, np.diagonal(covariance))
-    vague = variances > EARTH_RATE**2
-    vague[:4] = False
-    if not vague.any():
-        return invisible.copy(), rank, ()
-    kept = np.flatnonzero(~invisible[4:]) + 4
-    spread = np.linalg.eigvalsh(covariance[np.ix_(kept, kept)])
-    largest = deg_per_h_from_rad_per_s(float(np.sqrt(variances[vague].max())))
-    words = Message(
-        "unobservable",
-        "Not determined by these positions: %(parameters)s. The standard uncertainty would be up to "
-        "%(largest).3g °/h, more than the Earth rate by which the gyro is measured. Measure "
-        "positions with other θ and ψ.",
-        {"parameters": names(vague), "largest": largest},
-    )
-    return invisible | vague, rank - max(1, int(np.sum(spread > EARTH_RATE**2))), (words,)

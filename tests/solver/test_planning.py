@@ -126,6 +126,20 @@ def test_only_theta_zero_shows_no_g_sensitive_drift():
     np.testing.assert_allclose(nearly.u[4:6], exact.u[4:6], rtol=0.2)
 
 
+def test_what_arcseconds_alone_show_is_called_weak():
+    """At θ = 0 the certified arcminute shows ωg a little: u is below the Earth rate, but nobody would want it."""
+    angles = 60 * ARCSEC * np.array([[1, -1, 0], [-1, 1, 0], [1, 1, 0], [-1, -1, 0]], float)
+    found = predict(places(grid(thetas=(0,)), angles), 600.0, at())
+    assert found.rank == 8
+    assert [item.code for item in found.warnings] == ["weak"]
+    text = found.warnings[0].text
+    assert "Hardly determined by these positions: wg, wk." in text
+    assert "+1 °/h/g" in text
+    assert "kx" not in text
+    assert found.condition > 100
+    assert found.u[6] > 1000 * found.u[4]
+
+
 @pytest.mark.parametrize("latitude", [90.0, -90.0, 89.99999])
 def test_at_a_pole_nothing_is_told_whatever_the_positions(latitude):
     found = predict(places(grid(thetas=range(0, 360, 45), psis=range(0, 360, 45))), SECONDS, at(latitude))
