@@ -101,7 +101,7 @@ def add_certificate(
     version = 1 + max((item.version for item in equipment.certificates(work.db, row.id)), default=0)
     certificate = StandCertificate(
         stand=row, number=number, version=version, valid_from=valid_from, valid_until=valid_until,
-        issued_by=issued_by, digest=hashlib.sha256(write_certificate_csv(ordered)).hexdigest(),
+        issued_by=issued_by, digest=_digest(ordered, common),
         created_at=work.now, created_by=work.person.name, **common._asdict(),
         positions=[CertificatePosition(**_columns(item)) for item in ordered],
     )  # fmt: skip
@@ -117,6 +117,12 @@ def _check_common(common: CommonAngles) -> None:
         raise Invalid(
             *(replace(item, column=(item.column or "").lstrip("/")) for item in error.problems)
         ) from error
+
+
+def _digest(rows: Sequence[CertificateRow], common: CommonAngles) -> str:
+    """SHA-256 of the positions as their file, and of what they have in common where that is stated."""
+    said = "" if common == NONE_IN_COMMON else repr(tuple(common))
+    return hashlib.sha256(write_certificate_csv(rows) + said.encode()).hexdigest()
 
 
 def _in_one_turn(rows: Sequence[CertificateRow]) -> list[CertificateRow]:

@@ -12,7 +12,7 @@ PER_H = np.pi / 180 / 3600
 """One °/h in rad/s, from the definition."""
 
 
-def tested(term, value, u, **more):
+def made(term, value, u, **more):
     told = {
         "f": 4.0,
         "p_value": 0.06,
@@ -36,7 +36,7 @@ def test_every_term_has_a_unit():
 
 
 def test_a_term_is_written_in_laboratory_units_with_its_expanded_uncertainty():
-    told = model_json(comparison(tested("wg_split", 0.5, 0.25)))
+    told = model_json(comparison(made("wg_split", 0.5, 0.25)))
     (term,) = told["terms"]
     assert term["value"] == pytest.approx(0.5, rel=1e-14)
     # k of the normal distribution for 95 %, from tables: 1.959964
@@ -46,13 +46,13 @@ def test_a_term_is_written_in_laboratory_units_with_its_expanded_uncertainty():
 
 
 def test_without_stated_noise_student_gives_the_factor():
-    told = model_json(comparison(tested("wn", 0.5, 0.25, delta_chi2=None, p_chi2=None, dof=10)))
+    told = model_json(comparison(made("wn", 0.5, 0.25, delta_chi2=None, p_chi2=None, dof=10)))
     # k of Student's t with 10 degrees of freedom for 95 %, from tables: 2.228
     assert told["terms"][0]["expanded_uncertainty"] == pytest.approx(0.25 * 2.228, rel=2e-4)
 
 
 def test_what_cannot_be_tested_says_why():
     why = Message("term-unobservable", "Not shown.")
-    told = model_json(comparison(tested("wn", np.nan, np.nan, f=None, p_value=None, p_holm=None, reason=why)))
+    told = model_json(comparison(made("wn", np.nan, np.nan, f=None, p_value=None, p_holm=None, reason=why)))
     assert told["terms"][0]["reason"] == {"code": "term-unobservable", "message": "Not shown."}
     assert told["terms"][0]["value"] is None

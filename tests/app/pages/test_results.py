@@ -47,7 +47,10 @@ def test_both_methods_stand_side_by_side(technician: TestClient, result: int) ->
     # The currents were made for K = 2063 °/h/mA: both methods find it.
     assert text_of(rows[0]).count("206") >= 2
     assert "guard band" in page
-    assert "covers the noise of the currents only" in text_of(page)
+    words = text_of(page)
+    assert "Uncertainty budget" in words
+    assert "Noise of the means dominates Kx, Ky, Kxy, Kyx, ω0x, ω0y, ωg, ωk" in words
+    assert "The data support no further term." in words
 
 
 def test_the_fit_is_told_in_a_line(technician: TestClient, result: int) -> None:
@@ -236,7 +239,7 @@ def test_the_parameters_as_csv(technician: TestClient, result: int) -> None:
     for row in rows:
         known = stored[row["method"]]["parameters"][row["parameter"]]
         assert float(row["value"]) == known["value"]
-        assert float(row["expanded_uncertainty"]) == 2 * known["standard_uncertainty"]
+        assert float(row["expanded_uncertainty"]) == known["coverage_factor"] * known["standard_uncertainty"]
     assert {row["verdict"] for row in rows if row["method"] == "least-squares"} == {"no-limit", "conforms"}
 
 

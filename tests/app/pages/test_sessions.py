@@ -3,6 +3,7 @@ import io
 import json
 import re
 
+import pytest
 from fastapi.testclient import TestClient
 from starlette.datastructures import URL
 
@@ -63,7 +64,8 @@ def test_facets_count_and_narrow(technician: TestClient, opened: int) -> None:
 def test_the_list_as_csv_and_json(technician: TestClient, result: int, measured: int) -> None:
     rows = list(csv.DictReader(io.StringIO(technician.get("/sessions.csv").text)))
     assert [row["session"] for row in rows] == [str(measured)]
-    assert rows[0]["coverage_factor"] == "2.0"
+    # u(J) is stated without degrees of freedom: k of the normal distribution for 95 %, from tables
+    assert float(rows[0]["coverage_factor_w0x"]) == pytest.approx(1.959964, abs=1e-6)
     assert float(rows[0]["w0x_deg_per_h"]) == technician.get("/sessions.json").json()[0]["w0x_deg_per_h"]
 
 
