@@ -164,7 +164,8 @@ def _superseded(found: SessionDetail) -> list[MeasurementView]:
 _COLUMNS: Final = (
     "session", "gyro", "type", "stand", "certificate", "start", "started_at", "origin", "operator",
     "temperature_c", "positions_measured", "positions_total", "state", "result", "verdict",
-    "w0x_deg_per_h", "expanded_w0x_deg_per_h", "w0y_deg_per_h", "expanded_w0y_deg_per_h", "coverage_factor_w0x", "coverage_factor_w0y",
+    "w0x_deg_per_h", "expanded_w0x_deg_per_h", "w0y_deg_per_h", "expanded_w0y_deg_per_h",
+    "coverage_factor_w0x", "coverage_factor_w0y",
     "note",
 )  # fmt: skip
 _MEANS: Final = (

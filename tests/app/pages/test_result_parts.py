@@ -11,9 +11,10 @@ from solver.records import PARAMETERS
 from solver.terms import TERMS as SOLVER_TERMS
 
 # The interface's codes of blunders, and the one for what none of them explains.
-CODES = ("outlier", "positions-swapped", "position-wrong", "angle-unit", "channel-stuck", "channel-saturated",
-         "warm-up", "channels-swapped", "channel-sign", "latitude-sign", "latitude-complement", "psi-reversed", "theta-reversed",
-         "current-unit", "unexplained")  # fmt: skip
+CODES = (
+    "outlier positions-swapped position-wrong angle-unit channel-stuck channel-saturated warm-up channels-swapped "
+    "channel-sign latitude-sign latitude-complement psi-reversed theta-reversed current-unit unexplained"
+).split()
 
 
 def line(code, share):
@@ -81,7 +82,8 @@ def test_without_a_budget_there_is_nothing_to_show():
 
 def test_intervals_are_rounded_to_three_digits_of_the_expanded_uncertainty():
     entry = {"expanded_uncertainty": 0.53112, "first_order": [2062.16578, 2063.228],
-             "symmetric": [2062.14425, 2063.2489], "shortest": [2062.1417, 2063.2461], "difference": 0.0215, "tolerance": 0.05, "agrees": True}  # fmt: skip
+             "symmetric": [2062.14425, 2063.2489],
+             "shortest": [2062.1417, 2063.2461], "difference": 0.0215, "tolerance": 0.05, "agrees": True}  # fmt: skip
     found = MonteCarlo.of({"monte_carlo": {"trials": 20000, "seed": 3, "conclusion": {"code": "x", "message": "Yes."},
                                            "parameters": dict.fromkeys(PARAMETERS, entry)}})  # fmt: skip
     assert (found.trials, found.seed, found.sentence) == ("20000", 3, "Yes.")
