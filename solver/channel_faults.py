@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver.current_model import REGRESSORS
 from solver.hypotheses import Hypothesis, measuring_order
@@ -74,38 +73,33 @@ def saturated_channels(observations: Observations) -> Iterator[Hypothesis]:
         currents, tolerance = _channel(observations, channel)
         tried: set[tuple[int, ...]] = set()
         for height in (np.abs(currents), currents, -currents):
-            for rows in _tops(height, tolerance):
-                if len(rows) < _LEAST_RUN or tuple(rows) in tried:
+            for rows, level in _tops(height, tolerance):
+                if len(rows) < _LEAST_RUN or rows in tried:
                     continue
-                tried.add(tuple(rows))
-                top = rows[height[rows] > height.max() * (1 - _HALF_CLIPPED)]
+                tried.add(rows)
                 missing = np.zeros((len(currents), 2), dtype=np.bool_)
-                missing[rows, channel] = True
-                level = height[top][
-                    np.abs(height[top] - height.max()) <= tolerance[top] + tolerance[np.argmax(height)]
-                ]
+                missing[list(rows), channel] = True
                 yield Hypothesis(
-                    "channel-saturated", tuple(int(row) for row in rows), 6,
-                    free=1 + len(rows) - len(level), missing=missing, repeated=level,
+                    "channel-saturated", rows, 6, free=1 + len(rows) - level, missing=missing,
+                    repeated=np.sort(height[list(rows)])[len(rows) - level :],
                     details={"channel": name, "limit": float(height.max())},
                 )  # fmt: skip
 
 
-def _tops(height: Array, tolerance: Array) -> Iterator[NDArray[np.int64]]:
-    """Rows at the top: equal, equal within noise, and with the next one, which may be clipped in part."""
-    largest = height.max()
-    if not largest > 0:
+def _tops(height: Array, tolerance: Array) -> Iterator[tuple[tuple[int, ...], int]]:
+    """Rows at the top, and how many of them agree: equal, equal within noise, and each with the next one.
+
+    The next one may be clipped in a part of its record, so its own mean is free.
+    """
+    order = np.argsort(-height, kind="stable")
+    falling = height[order]
+    if not falling[0] > 0:
         return
-    equal = np.flatnonzero(height == largest)
-    near = np.flatnonzero(largest - height <= tolerance + tolerance[np.argmax(height)])
-    yield equal
-    yield near
-    for rows in (equal, near):
-        others = np.setdiff1d(np.arange(len(height)), rows)
-        if len(others):
-            following = others[np.argmax(height[others])]
-            if height[following] > largest * (1 - _HALF_CLIPPED):
-                yield np.sort(np.append(rows, following))
+    within = int(np.sum(falling[0] - falling <= tolerance[order] + tolerance[order[0]]))
+    for count in {int(np.sum(falling == falling[0])), within}:
+        yield tuple(sorted(int(row) for row in order[:count])), count
+        if count < len(order) and falling[count] > falling[0] * (1 - _HALF_CLIPPED):
+            yield tuple(sorted(int(row) for row in order[: count + 1])), count
 
 
 def _channel(observations: Observations, channel: int) -> tuple[Array, Array]:
@@ -119,11 +113,7 @@ def _channel(observations: Observations, channel: int) -> tuple[Array, Array]:
 
 def _run(currents: Array, tolerance: Array | None) -> int:
     """Where the last run of repeated values begins."""
-    start = len(currents) - 1
-    while start > 0:
-        part = currents[start - 1 :]
-        allowed = 0.0 if tolerance is None else 2.0 * float(tolerance[start - 1 :].max())
-        if np.ptp(part) > allowed:
-            break
-        start -= 1
-    return start
+    backwards = currents[::-1]
+    spread = np.maximum.accumulate(backwards) - np.minimum.accumulate(backwards)
+    allowed = 0.0 if tolerance is None else 2.0 * np.maximum.accumulate(tolerance[::-1])
+    return len(currents) - int(np.argmin(np.append(spread <= allowed, False)))

@@ -31,6 +31,7 @@ _DISBELIEVED: Final = 1e5
 _NO_RANK: Final = 1e-9
 _SINGULAR: Final = 1e-6
 _CLEAR: Final = 1e-3
+_RIDGE: Final = 1e-13
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +139,8 @@ def fit(data: Data, start: Array, others: Array | None, rounds: int = 2) -> list
     currents, some = data.currents, data.missing.any()
     drift = data.course.any()
     extra = np.kron(data.course[..., None], np.eye(2)) if drift else np.zeros((count, 2 * n, 0))
-    for _ in range(_ROUNDS_WITHOUT if some else rounds):
+    rounds = _ROUNDS_WITHOUT if some else rounds
+    for left in reversed(range(rounds)):
         inverse, usable = _inverse(values)
         alive &= usable
         design = _design(data.x, currents)
@@ -149,8 +151,10 @@ def fit(data: Data, start: Array, others: Array | None, rounds: int = 2) -> list
             design = _design(data.x, currents)
         whitening = _whitening(data, inverse, others)
         both = np.concatenate((design, extra, right_side), axis=-1).reshape(count, n, 2, -1)
-        solved = _solve(_apply(whitening, inverse[:, None] @ both))
-        values = np.where(alive[:, None], solved.values[:, :_COUNT], start)
+        whitened = _apply(whitening, inverse[:, None] @ both)
+        if left:  # to reweight by, normal equations are good enough
+            values = np.where(alive[:, None], _quickly(whitened)[:, :_COUNT], start)
+    solved = _solve(whitened)
     gone = data.missing.sum(axis=(1, 2))
     return [
         _one(solved, whitening, index, int(gone[index]), bool(data.course[index].any()))
@@ -230,6 +234,15 @@ def _apply(whitening: Array, blocks: Array) -> Array:
     if whitening.ndim == 4:
         return np.asarray((whitening @ blocks).reshape(count, 2 * n, columns))
     return np.asarray(whitening @ blocks.reshape(count, 2 * n, columns))
+
+
+def _quickly(both: Array) -> Array:
+    """Least squares by normal equations of scaled columns, with a little ridge where they are singular."""
+    products = np.swapaxes(both, 1, 2) @ both
+    scale = np.sqrt(np.einsum("nii->ni", products))[:, :-1]
+    scale = np.where(scale == 0, 1.0, scale)
+    normal = products[:, :-1, :-1] / (scale[:, :, None] * scale[:, None, :]) + _RIDGE * np.eye(scale.shape[1])
+    return np.asarray(np.linalg.solve(normal, (products[:, :-1, -1] / scale)[..., None])[..., 0] / scale)
 
 
 def _solve(both: Array) -> _Solved:
