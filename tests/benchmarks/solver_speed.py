@@ -8,7 +8,7 @@ The library functions give the estimate alone; `estimate` and `solve_batch` give
 `solve` the singular values and vectors, `calibrate` everything of a result (weights from the scale
 factors, observability, outliers, …). `solve_sessions` begins with angles and currents: it forms the
 equations, weights them by u(J) in two rounds, and gives values, covariance, χ² and a verdict on what
-is observable; `FixedWeights` forms the equations' sums and solves them once.
+is observable.
 """
 
 import os
@@ -20,9 +20,7 @@ import numpy as np
 from scipy import optimize
 
 from solver.batch import Stand, solve_sessions
-from solver.block import BLOCK
 from solver.calibrate import calibrate
-from solver.draws import FixedWeights
 from solver.error_model import Equations, currents, design_matrix, observation_equations, scale_matrix
 from solver.geometry import case_orientation, elements
 from solver.least_squares import column_scale, estimate, solve, solve_batch
@@ -138,15 +136,6 @@ def main() -> None:
     u_jx, u_jy = observations.u_jx, observations.u_jy
     assert u_jx is not None
     assert u_jy is not None
-    reference = calibrate(observations, "least-squares").least_squares
-    assert reference is not None
-    fixed = FixedWeights.of(reference.values, np.column_stack((u_jx, u_jy)))
-
-    def draws() -> None:
-        for first in range(0, BATCH, BLOCK):
-            part = slice(first, first + BLOCK)
-            fixed.solve(stand.block(angles, jx[part], jy[part]))
-
     many = medians(
         {
             "numpy.linalg.lstsq": lambda: [
@@ -160,7 +149,6 @@ def main() -> None:
             "solver solve_sessions, own angles": lambda: solve_sessions(
                 stand, every_angle, jx, jy, u_jx, u_jy
             ),
-            "solver FixedWeights": draws,
         },
         BATCH_RUNS,
     )

@@ -3,15 +3,10 @@
 import numpy as np
 import pytest
 
-from solver import successive
 from solver.batch import Stand, elements_of_batch, solve_sessions
-from solver.draws import FixedRows, FixedWeights
 from solver.error_model import observation_equations
-from solver.estimation import least_squares, paper
-from solver.generalised import generalised
+from solver.estimation import least_squares
 from solver.geometry import case_orientation, elements
-from solver.inputs import inputs_of
-from solver.rate_noise import root_inverse
 from tests.solver.sessions import Setup, grid, truth
 
 SESSIONS = 40
@@ -124,38 +119,3 @@ def test_elements_written_out(rng):
     np.testing.assert_allclose(elements_of_batch(theta, psi, angles), at[:4], atol=2e-15)
     block = np.repeat(angles[:, :, None], 3, axis=2)
     np.testing.assert_allclose(elements_of_batch(theta, psi, block)[0][:, 2], at.a, atol=2e-15)
-
-
-@pytest.mark.parametrize("weighted", [True, False])
-def test_draws_with_fixed_weights(weighted, rng):
-    """Against numpy's lstsq on equations whitened by hand."""
-    sessions, (stand, angles, jx, jy), u = many(SETUPS["ordinary"], rng, 3.0)
-    reference = truth()
-    u_currents = np.column_stack((u[0][0], u[1][0])) if weighted else None
-    found = FixedWeights.of(reference, u_currents).solve(stand.block(angles, jx, jy))
-    k = np.linalg.inv([[reference[0], reference[2]], [reference[3], reference[1]]])
-    for one, values in zip(sessions, found, strict=True):
-        equations = observation_equations(one)
-        whitening = np.eye(32)
-        if weighted:
-            for row, u_row in enumerate(u_currents):
-                whitening[2 * row : 2 * row + 2, 2 * row : 2 * row + 2] = k / u_row[:, None]
-        scale = np.linalg.norm(equations.design, axis=0)
-        expected = (
-            np.linalg.lstsq(whitening @ equations.design / scale, whitening @ equations.right_side)[0] / scale
-        )
-        np.testing.assert_allclose(values, expected, rtol=1e-9)  # κ² of some hundreds
-
-
-def test_draws_by_fixed_rows(rng):
-    """The paper's combinations give its limit; the root of V gives generalised least squares."""
-    sessions, (stand, angles, jx, jy), _ = many(SETUPS["ordinary"], rng)
-    block = stand.block(angles, jx, jy)
-    rows = successive.combination(*successive.position_weights(sessions[0]))
-    limits = np.array([paper(observation_equations(one), one).values for one in sessions])
-    np.testing.assert_allclose(FixedRows(rows).solve(block), limits, rtol=1e-7)  # its rounds end at 1e-12
-    first = generalised(observation_equations(sessions[0]), sessions[0])
-    root = root_inverse(inputs_of(sessions[0], first.values).residual_covariance)
-    u = first.estimate.standard_uncertainties
-    found = FixedRows(root).solve(block)[0]
-    np.testing.assert_allclose(found / u, first.values / u, atol=1e-6)  # weights of the next round
