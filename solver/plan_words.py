@@ -59,6 +59,6 @@ def weak(solution: LinearSolution, scale: Array, count: int) -> Message:
     return Message(
         "weak",
         "Hardly determined by these positions: %(parameters)s. A joint change by (%(combination)s) shows "
-        "%(factor).2g times less than the combination that shows best. Measure positions with other θ and ψ.",
-        {"parameters": names(part), "combination": ", ".join(told), "factor": solution.condition},
+        "%(factor).0f times less than the combination that shows best. Measure positions with other θ and ψ.",
+        {"parameters": names(part), "combination": ", ".join(told), "factor": float(f"{solution.condition:.1e}")},
     )
