@@ -23,7 +23,7 @@ class Check(BaseModel):
     """One expected value beside the obtained one: so many digits must agree, or it must lie in a range."""
 
     name: str
-    detail: str
+    detail: str = ""
     unit: str
     expected: float | str
     obtained: float | str | None

@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, Final
 
 from fastapi import APIRouter, Request, Response
 from markupsafe import Markup
 
 from app import figures
-from app.i18n import gettext, localised
+from app.i18n import gettext, localised, marked
 from app.pages.base import STATIC, Reader, TheLab, Writer, fragment, render, see
 from app.pages.labels import Mark
 from app.services import validation
@@ -18,7 +18,9 @@ from app.validation.report import json_text
 
 router = APIRouter()
 
-_VALUE_DIGITS = 15
+_VALUE_DIGITS: Final = 15
+_UNITS: Final = (marked("mg"), marked("nm"), marked("µV"), marked("V"), marked("rad"), marked("Ω"))
+"""Units of the published problems, for the catalogue: reports bring them as they stand here."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -95,6 +95,20 @@ def test_a_failed_case_is_open_and_says_so(technician: TestClient, lab: Lab, val
     assert f'href="/validation/{validated}"' in text
 
 
+def test_a_report_of_an_earlier_version_is_still_shown(
+    technician: TestClient, lab: Lab, validated: str
+) -> None:
+    """The first reports had no `detail` beside a check's name."""
+    with lab.read(access.SYSTEM) as work:
+        path = work.files.folder.parent / "validation" / f"{validated}.json"
+    content = json.loads(path.read_text(encoding="utf-8"))
+    for case in content["groups"][0]["cases"]:
+        for check in case["checks"]:
+            del check["detail"]
+    path.write_text(json.dumps(content), encoding="utf-8")
+    assert "All 12 cases passed." in words(technician.get("/validation").text)
+
+
 def test_the_report_as_json(technician: TestClient, validated: str) -> None:
     found = technician.get(f"/validation/{validated}.json").json()
     assert found["verdict"] == "pass"
