@@ -32,6 +32,7 @@ _NO_RANK: Final = 1e-9
 _SINGULAR: Final = 1e-6
 _CLEAR: Final = 1e-3
 _RIDGE: Final = 1e-13
+_ROUNDING: Final = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,17 +216,25 @@ def _whitening(data: Data, inverse: Array, others: Array | None) -> Array:
     blown = np.where(data.missing, _DISBELIEVED, 1.0)
     if data.u is not None and others is None:
         return np.asarray((1.0 / (data.u * blown))[..., None] * np.eye(2))
-    if data.u is None:
-        block = UNTOLD**2 * inverse @ np.swapaxes(inverse, -1, -2)
-        blocks = block[:, None] * (blown[..., None] * blown[..., None, :])
-        return np.asarray(np.linalg.inv(np.linalg.cholesky(blocks)))
+    if data.u is None:  # V = K⁻¹·K⁻ᵀ, whose root needs no factorisation
+        return np.asarray(np.linalg.inv(inverse)[:, None] / (UNTOLD * blown[..., None, :]))
     left = (inverse[:, None] @ others.reshape(n, 2, -1)).reshape(count, 2 * n, 2 * n)  # type: ignore[union-attr]
     covariance = (inverse[:, None] @ np.swapaxes(left, 1, 2).reshape(count, n, 2, -1)).reshape(left.shape)
     covariance = (covariance + np.swapaxes(covariance, 1, 2)) / 2
     diagonal = np.arange(2 * n)
     covariance[:, diagonal, diagonal] += data.u.reshape(count, -1) ** 2
     covariance[:, diagonal, diagonal] *= blown.reshape(count, -1) ** 2
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
+    return _root_of_inverse(covariance)
+
+
+def _root_of_inverse(covariance: Array) -> Array:
+    """W with Wᵀ·W = V⁻¹; where V is singular to rounding, with its smallest eigenvalues raised to that."""
+    try:
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(covariance)
+        raised = np.maximum(values, _ROUNDING * values[:, -1:])
+        return np.asarray(np.swapaxes(vectors, 1, 2) / np.sqrt(raised)[..., None])
 
 
 def _apply(whitening: Array, blocks: Array) -> Array:

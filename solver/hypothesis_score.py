@@ -126,7 +126,8 @@ class Session:
         x = regressors(at)
         currents = np.stack((at.jx, at.jy), axis=1)
         if at.u_jx is not None and at.u_jy is not None:
-            u = np.stack((at.u_jx, at.u_jy), axis=1)
+            least = np.finfo(float).eps * float(np.abs(currents).max()) or 1.0
+            u = np.maximum(np.stack((at.u_jx, at.u_jy), axis=1), least)  # less than rounding means nothing
         else:  # each channel in units of its size
             square = np.sqrt(np.mean(currents**2, axis=0))
             u = np.tile(np.where(square > 0, square, 1.0), (len(at), 1))
@@ -244,7 +245,7 @@ class Session:
         if not free:
             return 0.0
         good, other = self.comparable(score)
-        unit = 1.0 if self.told else max(other.variance, np.finfo(float).tiny)
+        unit = 1.0 if self.told else max(other.variance, _ROUNDING**2 * good.squares, np.finfo(float).tiny)
         return free * max(OCCAM, float(np.log(max(good.squares - other.squares, unit) / (free * unit))))
 
     def _distance(self, fitted: Fitted | None) -> float | None:

@@ -74,7 +74,7 @@ def rates(label: str, make: Make, study: Study, count: int, seed: int, *, with_p
     return Rates(detected / count, named / count, float(np.median(times)))
 
 
-def by_blunder(count: int, seed: int, only: str) -> None:
+def by_blunder(counts: tuple[int, int], seed: int, only: str) -> None:
     """Print the rates of each blunder, with and without u(J)."""
     print("| blunder | detected | named | without u(J): detected | named | time, ms |")
     print("| --- | --- | --- | --- | --- | --- |")
@@ -83,7 +83,7 @@ def by_blunder(count: int, seed: int, only: str) -> None:
             study = Study(misalignment=300.0 if name == "angle-unit" else 60.0)
             told, untold = (
                 rates(name, make, at(study, u_given=given), count, seed, with_prior=name in INVISIBLE)
-                for given in (True, False)
+                for given, count in zip((True, False), counts, strict=True)
             )
             print(
                 f"| {name} | {told.detected:.1%} | {told.named:.1%} | {untold.detected:.1%} | {untold.named:.1%} "
@@ -92,7 +92,7 @@ def by_blunder(count: int, seed: int, only: str) -> None:
             )
 
 
-def of_good_sessions(count: int, seed: int) -> None:
+def of_good_sessions(counts: tuple[int, int], seed: int) -> None:
     """Print the false alarms."""
     print("\n| good sessions | false alarms | without u(J) | time, ms |\n| --- | --- | --- | --- |")
     for with_prior in (False, True):
@@ -123,14 +123,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sessions", type=int, default=1000, help="for each blunder")
     parser.add_argument("--good", type=int, default=10_000, help="good sessions, for each kind")
+    parser.add_argument("--untold", type=float, default=1.0, help="part of these for sessions without u(J)")
     parser.add_argument("--angles", type=int, default=300, help="sessions for each cell of the second table")
     parser.add_argument("--only", default="", help="blunders whose name contains this")
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     if options.sessions:
-        by_blunder(options.sessions, options.seed, options.only)
+        by_blunder((options.sessions, round(options.sessions * options.untold)), options.seed, options.only)
     if options.good:
-        of_good_sessions(options.good, options.seed)
+        of_good_sessions((options.good, round(options.good * options.untold)), options.seed)
     if options.angles:
         by_angles(options.angles, options.seed)
 
