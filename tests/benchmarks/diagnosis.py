@@ -98,7 +98,7 @@ def of_good_sessions(counts: tuple[int, int], seed: int) -> None:
     for with_prior in (False, True):
         told, untold = (
             rates("good", good, Study(u_given=given), count, seed, with_prior=with_prior)
-            for given in (True, False)
+            for given, count in zip((True, False), counts, strict=True)
         )
         label = "with prior" if with_prior else "without prior"
         print(
