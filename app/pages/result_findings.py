@@ -71,9 +71,9 @@ def _in_words(message: Message) -> Message:
 
 
 def _finding(item: Json, measured: Mapping[tuple[float, float, int], int]) -> FindingRow:
-    advice = item.get("advice")
+    advice, code = item.get("advice"), item["code"]
     return FindingRow(
-        title=gettext(TITLES[item["code"]]) if item["code"] in TITLES else item["code"],
+        title=gettext(TITLES[code]) if code in TITLES else code,
         text=translate(message_from(item)),
         advice=translate(message_from(advice)) if advice else "",
         places=[_place(place, measured) for place in item["positions"]],

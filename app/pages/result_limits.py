@@ -76,7 +76,7 @@ class Budget:
     @property
     def heads(self) -> list[str]:
         """The largest lines, in words."""
-        return [gettext(SOURCES[line["code"]]) for line in self.shown]
+        return [_source(line) for line in self.shown]
 
     @property
     def hidden(self) -> int:
@@ -100,7 +100,7 @@ class Budget:
         """Every line in words, with the standard uncertainty that it gives each parameter."""
         return [
             (
-                gettext(SOURCES[line["code"]]),
+                _source(line),
                 [significant(line["standard_uncertainties"][name], 2) for name in PARAMETERS],
             )
             for line in self._lines
@@ -125,6 +125,11 @@ class Budget:
             for line, names in by_line.items()
         ]
         return "; ".join(parts) + "." if parts else ""
+
+
+def _source(line: Json) -> str:
+    code = line["code"]
+    return gettext(SOURCES[code])
 
 
 def _share(share: float, dominates: bool) -> Share:

@@ -54,10 +54,10 @@ class Model:
 
 
 def _term(item: Json, supported: bool) -> TermRow:
-    reason = item.get("reason")
+    reason, term = item.get("reason"), item["term"]
     expanded = item.get("expanded_uncertainty")
     return TermRow(
-        name=gettext(TERMS[item["term"]]),
+        name=gettext(TERMS[term]),
         shown=measured(item["value"], expanded),
         unit=labels.unit(item["unit"]),
         f=DASH if item["f"] is None else significant(item["f"], 3),
