@@ -12,7 +12,7 @@ is any sampled rate, here a current; the interval between samples is τ₀.
 
 Of N samples M second differences are averaged, but they are correlated: the variance is distributed
 like χ² with fewer, "equivalent", degrees of freedom. Their number follows from the autocovariance R
-of the second differences of the noise at hand, with M² at most:
+of the second differences of the noise at hand:
 
     edf = M·R(0)² / Σ_k (1 − |k|/M)·R(k)²        (|k| < M)
 

@@ -53,7 +53,7 @@ class AllanRow(NamedTuple):
 class NoiseView:
     """What the template writes."""
 
-    findings: Sequence[tuple[str, Mark]]
+    findings: Sequence[tuple[Sequence[str], Mark]]
     facts: Sequence[Fact]
     coefficients: Sequence[CoefficientRow]
     scales_from: int | None
@@ -67,11 +67,7 @@ class NoiseView:
 def noise_view(noise: RecordNoise) -> NoiseView:
     """Everything in words and figures of the current language."""
     return NoiseView(
-        findings=[
-            (channel, _mark(message))
-            for channel, document in noise.documents.items()
-            for message in document["findings"]
-        ],
+        findings=_findings(noise),
         facts=list(_facts(noise.documents["jx"], noise.documents["jy"])),
         coefficients=list(_coefficients(noise.documents["jx"], noise.documents["jy"])),
         scales_from=noise.currents.scales_from,
@@ -83,6 +79,15 @@ def noise_view(noise: RecordNoise) -> NoiseView:
     )
 
 
+def _findings(noise: RecordNoise) -> list[tuple[list[str], Mark]]:
+    """Each finding with its channels: what holds for both is said once."""
+    found: dict[Mark, list[str]] = {}
+    for channel, document in noise.documents.items():
+        for message in document["findings"]:
+            found.setdefault(_mark(message), []).append(channel)
+    return [(channels, item) for item, channels in found.items()]
+
+
 def _mark(message: Message) -> Mark:
     shape = {"steady": "ok", "too-short-to-judge": "excluded"}.get(message.code, "attention")
     return Mark(shape, translate(message))
@@ -92,7 +97,7 @@ def _facts(x: Document, y: Document) -> Iterator[Fact]:
     def row(name: str, sign: str, shown: Callable[[Document], str]) -> Fact:
         return Fact(name, sign, shown(x), shown(y))
 
-    na, seconds = unit("nA"), unit("s")
+    na, seconds, minutes = unit("nA"), unit("s"), gettext("min")
     yield row(gettext("Effective samples"), "", lambda d: _count(d["n_eff"], d["samples"]))
     yield row(
         gettext("Autocorrelation time"),
@@ -106,7 +111,7 @@ def _facts(x: Document, y: Document) -> Iterator[Fact]:
         lambda d: _u(d["u_autocorrelation_ma"], d["dof_autocorrelation"]),
     )  # fmt: skip
     yield row(
-        gettext("Slope"), f"{na}/{gettext('min')}",
+        gettext("Slope"), f"{na}/{minutes}",
         lambda d: _tested(d["slope"], "_ma_per_s", NA_PER_MA * _S_PER_MIN),
     )  # fmt: skip
     yield row(gettext("Second half less first"), na, lambda d: _tested(d["mean_step"], "_ma", NA_PER_MA))
@@ -126,14 +131,15 @@ def _times(value: float | None, factor: float) -> float | None:
 def _count(n_eff: float | None, samples: int) -> str:
     if n_eff is None:
         return figures.DASH
-    shown = figures.plain(float(f"{n_eff:.2g}"), 0)
+    shown = figures.figure(float(f"{n_eff:.2g}"), 0)
     return gettext("%(part)s of %(all)s") % {"part": shown, "all": samples}
 
 
 def _u(u_ma: float | None, dof: float | None) -> str:
     if u_ma is None or dof is None:
         return figures.DASH
-    return f"{figures.significant(u_ma * NA_PER_MA, 2)} ({symbol_text('nu')} {dof:.0f})"
+    u = u_ma * NA_PER_MA
+    return f"{figures.figure(u, max(0, figures.decimals_of(u) or 0))} ({symbol_text('nu')} {dof:.0f})"
 
 
 def _p(p_value: float) -> str:

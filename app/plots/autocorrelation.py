@@ -46,7 +46,7 @@ def template() -> Spec:
 
     x = alt.X(
         "t:Q", scale=alt.Scale(domain=[0.0, alt.ExprRef("last")], nice=False),
-        axis=alt.Axis(title=None, ticks=True, tickSize=4, labelPadding=4, labelFlush=True),
+        axis=alt.Axis(title=None, ticks=True, tickSize=4, labelPadding=4, tickCount=6, labelOverlap=True),
     )  # fmt: skip
     scale = alt.Scale(domain=[alt.ExprRef("low"), 1.0], nice=False)
     axis = alt.Axis(title=None, minExtent=44, maxExtent=44, tickCount=5)

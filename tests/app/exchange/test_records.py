@@ -190,15 +190,17 @@ def test_means_of_a_record() -> None:
     assert (row.duration_s, row.rate_hz) == (60.0, 200.0)
     # The mean of 12,000 white samples of 1e-5 has a standard deviation of 9.1e-8; five of them.
     assert row.jx_ma == pytest.approx(0.0045, abs=4.6e-7)
-    # Batch means of 109 batches know u to 7 %; four times that.
+    # With some 50 degrees of freedom u is known to 10 %, nearly three times that.
     assert row.u_jx_ma == pytest.approx(1e-5 / np.sqrt(N), rel=0.28)
     assert row.u_jy_ma is not None
 
 
 def test_a_channel_without_noise_has_no_known_uncertainty() -> None:
     row = means_row(record(jx_ma=np.full(N, 0.5)))
-    assert row.u_jx_ma is None
+    assert (row.u_jx_ma, row.dof_jx) == (None, None)
     assert row.u_jy_ma is not None
+    assert row.dof_jy is not None
+    assert row.dof_jy >= 6
 
 
 def test_means_are_the_same_bits_whatever_the_file() -> None:
