@@ -35,6 +35,7 @@ from solver.records import PARAMETERS, Observations
 from solver.suspicion import suspect
 from solver.verdicts import (
     cannot_exclude,
+    factor_text,
     place,
     places,
     separate,
@@ -183,7 +184,10 @@ def _positions(observations: Observations, rows: Sequence[int]) -> tuple[tuple[f
 def _named(observations: Observations, item: Explanation) -> str:
     """A member of a class in no language: its code, channel or factor, and positions."""
     parts = [item.code]
-    parts += [str(item.details[key]) for key in ("channel", "factor") if key in item.details]
+    if "channel" in item.details:
+        parts.append(item.details["channel"])
+    if "factor" in item.details:
+        parts.append(f"×{factor_text(item.details['factor'])}")
     if item.rows:
         parts.append(f"({places(observations, item.rows)})")
     if "actual" in item.details:

@@ -29,6 +29,11 @@ def number(value: float) -> str:
     return f"{value:.0f}" if 1e4 <= abs(value) < 1e9 else f"{value:.4g}"
 
 
+def factor_text(factor: float) -> str:
+    """``60`` or ``1/60``."""
+    return f"{factor:.6g}" if factor >= 1 else f"1/{1 / factor:.6g}"
+
+
 def _current(current: float) -> str:
     return f"{ma_from_ampere(current):.7g}"
 
@@ -145,7 +150,7 @@ def _of_the_session(code: str, details: Mapping[str, Any], fall: dict[str, str])
             "The certificate's angles look as if they had been read in a wrong unit: multiplied by %(factor)s "
             "(60: arcminutes, 3600: degrees taken for arcseconds), %(measure)s falls from %(before)s to %(after)s. "
             "Check the unit in the certificate's header.",
-            {**fall, "factor": f"{details['factor']:.4g}"},
+            {**fall, "factor": factor_text(details["factor"])},
         )
     if code == "channels-swapped":
         return Message(
@@ -193,7 +198,7 @@ def _of_the_session(code: str, details: Mapping[str, Any], fall: dict[str, str])
         "current-unit",
         "The currents look as if they had been read in a wrong unit: multiplied by %(factor)s, %(measure)s falls "
         "from %(before)s to %(after)s. Check the unit in the header of the currents' file (A, mA or µA).",
-        {**fall, "factor": f"{details['factor']:.4g}"},
+        {**fall, "factor": factor_text(details["factor"])},
     )
 
 
@@ -245,7 +250,7 @@ def small_angles(factors: Sequence[float]) -> Message:
         "angle-unit",
         "The certificate's angles are too small to show in the fit whether their unit is right: multiplied by "
         "%(factors)s they would fit as well. Check the unit in the certificate's header.",
-        {"factors": ", ".join(f"{factor:.4g}" for factor in factors)},
+        {"factors": ", ".join(factor_text(factor) for factor in factors)},
     )
 
 
