@@ -22,8 +22,8 @@ SIXTEEN = tuple(
 )
 
 
-def question(asked: Asked = Asked(), latitude_deg: float = 55.7558, **more) -> Question:  # noqa: B008
-    return Question(SIXTEEN, latitude_deg, tuple(typical()[0].values()), asked, **more)
+def question(asked: Asked | None = None, latitude_deg: float = 55.7558, **more) -> Question:
+    return Question(SIXTEEN, latitude_deg, tuple(typical()[0].values()), asked or Asked(), **more)
 
 
 def test_the_whole_certificate_is_judged_when_nothing_else_is_asked() -> None:
