@@ -13,7 +13,7 @@ S are derivatives of the residuals (right side minus left side of (10)-(15)) by
 An error counts as *true minus assumed*.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from solver.error_model import design_matrix, earth_rate, right_side, scale_matrix
 from solver.errors import InputError, Message
-from solver.geometry import Elements, base, case_orientation, commanded, elements, misalignment
+from solver.geometry import case_orientation, elements
 from solver.records import PARAMETERS, Array, Observations
 
 COMMON: Final = (
@@ -45,7 +45,6 @@ SOURCES: Final[Mapping[str, tuple[str, ...]]] = {
 }
 """Lines of the budget, in their order, with the common inputs that each one gathers."""
 
-_STEP: Final = 1e-4
 _TOLERANCE: Final = 1e-9
 
 
@@ -232,53 +231,85 @@ def by_currents(count: int, parameters: Array) -> Array:
 
 def by_angles(observations: Observations, parameters: Array) -> Array:
     """Derivative of each position's two residuals by its α, β, γ, (n, 2, 3)."""
+    return _by_angles(observations, _orientation(observations), parameters)
+
+
+def _orientation(observations: Observations) -> Array:
     at = observations
+    return case_orientation(at.theta, at.psi, at.alpha, at.beta, at.gamma)
 
-    def turned(step: Array) -> Array:
-        orientation = misalignment(at.alpha + step[0], at.beta + step[1], at.gamma + step[2])
-        return _residuals(elements(orientation @ commanded(at.theta, at.psi)), observations, parameters)
 
-    return np.stack([_central(turned, np.eye(3)[axis]) for axis in range(3)], axis=-1).reshape(-1, 2, 3)
+def _by_angles(observations: Observations, orientation: Array, parameters: Array) -> Array:
+    """The same from Ã: a turn about v changes every column w of Ã by −v × w.
+
+    v is R₃·R₂·e₁ for α, R₃·e₂ for β and e₃ for γ.
+    """
+    beta, gamma = observations.beta, observations.gamma
+    none, one = np.zeros_like(beta), np.ones_like(beta)
+    about = np.array(
+        [
+            [np.cos(beta) * np.cos(gamma), -np.cos(beta) * np.sin(gamma), np.sin(beta)],
+            [np.sin(gamma), np.cos(gamma), none],
+            [none, none, one],
+        ]
+    )
+    north, up = orientation[..., 1].T, orientation[..., 2].T
+    changes = [
+        _by_columns(_minus_cross(v, north), _minus_cross(v, up), observations.latitude, parameters)
+        for v in about
+    ]
+    return np.stack(changes, axis=-1)
+
+
+def _minus_cross(v: Array, w: Array) -> tuple[Array, Array]:
+    """First two components of −v × w; v and w are (3, n)."""
+    return v[2] * w[1] - v[1] * w[2], v[0] * w[2] - v[2] * w[0]
+
+
+def _by_columns(
+    north: tuple[Array, Array], up: tuple[Array, Array], latitude: float, parameters: Array
+) -> Array:
+    """Change of the residuals, (n, 2), when a, b change by `north` and c, d by `up`."""
+    horizontal, vertical = earth_rate(latitude)
+    wg, wk = parameters[6:]
+    x = horizontal * north[0] + (vertical - wg) * up[0] + wk * up[1]
+    y = horizontal * north[1] + (vertical - wg) * up[1] - wk * up[0]
+    return np.stack((x, y), axis=-1)
 
 
 def by_common(observations: Observations, parameters: Array, common: CommonUncertainty) -> Array:
     """Derivative of the residuals by what is in common, (2n, 13), in the order of `COMMON`."""
     at = observations
-    here = elements(case_orientation(at.theta, at.psi, at.alpha, at.beta, at.gamma))
+    orientation = _orientation(at)
+    here = elements(orientation)
     design = design_matrix(here, at.jx, at.jy)
     k = scale_matrix(parameters)
     columns = np.zeros((2 * len(at), len(COMMON)))
     for channel, current in enumerate((at.jx, at.jy)):
         columns[:, channel] = -np.outer(current, k[:, channel]).ravel()
         columns[:, 2 + channel] = -np.tile(k[:, channel], len(at))
-    columns[:, 4:7] = by_angles(observations, parameters).reshape(-1, 3)
-    columns[:, 7:10] = _by_base(observations, parameters)
-    north, up = earth_rate(observations.latitude)
+    columns[:, 4:7] = _by_angles(at, orientation, parameters).reshape(-1, 3)
+    columns[:, 7:10] = _by_base(at, orientation, parameters)
+    north, up = earth_rate(at.latitude)
     columns[:, 10] = right_side(here, -up, north)
     columns[:, 11] = -design[:, 6:] @ parameters[6:]
     columns[:, 12] = -design @ common.temperature_coefficients
     return columns
 
 
-def _by_base(observations: Observations, parameters: Array) -> Array:
-    at = observations
-
-    def turned(step: Array) -> Array:
-        orientation = case_orientation(at.theta, at.psi, at.alpha, at.beta, at.gamma, base(*step))
-        return _residuals(elements(orientation), observations, parameters)
-
-    return np.stack([_central(turned, np.eye(3)[axis]) for axis in range(3)], axis=-1)
-
-
-def _central(function: Callable[[Array], Array], direction: Array) -> Array:
-    """Derivative by central differences: the sine's own step, so that a rotation's is exact to rounding."""
-    step = _STEP * direction
-    return (function(step) - function(-step)) / (2.0 * float(np.sin(_STEP)))
-
-
-def _residuals(here: Elements, observations: Observations, parameters: Array) -> Array:
-    design = design_matrix(here, observations.jx, observations.jy)
-    return np.asarray(right_side(here, *earth_rate(observations.latitude)) - design @ parameters)
+def _by_base(observations: Observations, orientation: Array, parameters: Array) -> Array:
+    """Derivative by level and azimuth, (2n, 3): a turn of the base about eₖ changes Ã·w by −Ã·(eₖ × w)."""
+    east, north, up = ((column[:, 0], column[:, 1]) for column in np.moveaxis(orientation, -1, 0))
+    none = np.zeros(len(observations))
+    nothing = (none, none)
+    changes = (((-up[0], -up[1]), north), (nothing, (-east[0], -east[1])), (east, nothing))
+    return np.stack(
+        [
+            _by_columns(of_north, of_up, observations.latitude, parameters).ravel()
+            for of_north, of_up in changes
+        ],
+        axis=-1,
+    )
 
 
 def _angles(observations: Observations, parameters: Array) -> tuple[Array, Array]:
