@@ -125,10 +125,11 @@ def _explained(session: Session, score: Score, certain: str = "") -> Explanation
     nearer = session.nearer(score)
     apart = (session.good.distance or 0.0) if nearer else 0.0
     squares = before.squares + apart, after.squares + apart - nearer
+    measure = "χ² + D²" if nearer else "χ²"
     return Explanation(
         hypothesis.code, hypothesis.rows, details, session.total(score) - (_CERTAIN if sure else 0.0),
         session.gain(score) + nearer, sure or session.significant(score), *squares,
-        ("χ²", *squares) if session.told else _scatters(before, after, by_currents=after is score.currents),
+        (measure, *squares) if session.told else _scatters(before, after, by_currents=after is score.currents),
         *_parameters(session, score),
     )  # fmt: skip
 
@@ -225,7 +226,7 @@ def _by_prior(session: Session, symmetry: Symmetry, thresholds: Thresholds) -> E
     return Explanation(
         symmetry.code, (), symmetry.details, 2.0 * float(np.log(len(INVISIBLE))) + after - before, before - after,
         before > after and before - after > thresholds.of(symmetry), misfit + before, misfit + after,
-        ("χ²" if session.told else "D²", misfit + before, misfit + after), values, u,
+        ("χ² + D²" if session.told else "D²", misfit + before, misfit + after), values, u,
     )  # fmt: skip
 
 

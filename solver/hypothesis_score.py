@@ -12,6 +12,8 @@ import numpy as np
 from scipy import special
 
 from solver.current_model import CurrentModel, Solutions, regressors
+from solver.error_model import observation_equations
+from solver.estimation import least_squares
 from solver.hypotheses import Hypothesis
 from solver.hypothesis_fit import UNTOLD, Data, Fitted, fit, other_inputs, rough
 from solver.inputs import CommonUncertainty
@@ -33,7 +35,6 @@ UNTOLD_RATIO: Final = 25.0
 DOUBT: Final = 1e-3
 """Probability of χ² below which the stated noise is no longer trusted for tests."""
 _LEAST_FREEDOM: Final = 3
-_ROUNDS_OF_RESULT: Final = 3
 _ROUNDING: Final = 1e-10
 
 
@@ -200,15 +201,11 @@ class Session:
 
         With grossly wrong data the weights, by which χ² is judged, depend on where their iteration begins.
         """
-        if self.good.rates is None or self.others is not None or not self.told:
+        if self.good.rates is None or not self.told:
             return self.good.best.squares
-        data = Data(
-            self.x[None], self.model.currents[None], self.u[None],
-            np.zeros((1, *self.u.shape), dtype=np.bool_), np.zeros((1, len(self.x))),
-        )  # fmt: skip
-        start = rough(data)
-        fitted = fit(data, start, None, rounds=_ROUNDS_OF_RESULT)[0] if np.isfinite(start).all() else None
-        return self.good.rates.squares if fitted is None else fitted.squares
+        equations = observation_equations(self.observations)
+        chi2 = least_squares(equations, self.observations, self.common).estimate.fit.chi2
+        return self.good.rates.squares if chi2 is None else chi2
 
     def comparable(self, score: Score) -> tuple[Sum, Sum]:
         """Sums of good data and of a hypothesis in one and the same kind of fit."""

@@ -20,6 +20,7 @@ TOLERANCE: Final = 1e-12
 _FLOOR_RATE: Final = 1e-3  # °/h, and part of Kx: below, a change is judged against this size
 _ITERATED: Final = ("kx", "ky", "kxy", "kyx", "wg", "wk")
 _GAUGE: Final = (6.0, 82.0)
+_LABELLED: Final = 3
 
 Json = Mapping[str, Any]
 
@@ -60,6 +61,11 @@ class ResidualRow:
     standardised_y: float | None
     beyond_x: bool
     beyond_y: bool
+
+    @property
+    def sizes(self) -> tuple[float | None, float | None]:
+        """Both standardised residuals."""
+        return self.standardised_x, self.standardised_y
 
 
 class ResultPage:
@@ -170,7 +176,9 @@ class ResultPage:
         return power + labels.unit("deg/h")
 
     def residual_points(self) -> Iterator[Residual]:
-        """The points of the residuals' chart."""
+        """The points of the residuals' chart; only the worst carry words."""
+        worst = sorted((abs(size or 0.0) for row in self.residuals for size in row.sizes), reverse=True)
+        from_here = worst[_LABELLED - 1] if len(worst) >= _LABELLED else 0.0
         for place, row in enumerate(self.residuals, start=1):
             for axis, value, standardised, beyond in (
                 ("x", row.x, row.standardised_x, row.beyond_x),
@@ -191,7 +199,8 @@ class ResultPage:
                     "sd": standard(abs(standardised or 0.0)),
                 }  # fmt: skip
                 yield Residual(
-                    place, "x" if axis == "x" else "y", value, beyond, f"{name}: {shown}{deviations}", brief,
+                    place, "x" if axis == "x" else "y", value, beyond, f"{name}: {shown}{deviations}",
+                    brief if abs(standardised or 0.0) >= from_here else "",
                     f"/measurements/{row.input.id}",
                 )  # fmt: skip
 
