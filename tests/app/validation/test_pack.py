@@ -1,8 +1,9 @@
 """The whole pack, with suites that take no time."""
 
 import json
+from pkgutil import resolve_name
 
-from app.validation import pack
+from app.validation import coverage, pack
 from app.validation.numbers import digest
 from app.validation.report import Case, Group, holds, report_json
 
@@ -36,3 +37,27 @@ def test_the_pack_holds_what_it_promises():
 def test_the_input_hash_depends_on_data_mode_and_seed():
     assert digest("quick", "1") == digest("quick", "1")
     assert len({digest("quick", "1"), digest("full", "1"), digest("quick", "2")}) == 3
+
+
+def test_the_functions_that_reports_name_exist(monkeypatch):
+    monkeypatch.setattr(coverage, "QUICK", 1)
+    monkeypatch.setattr(coverage, "_RECORDS", 32)
+    for _, suite in pack.suites(full=False, seed=1).values():
+        for case in suite(lambda fraction, what: None).cases:
+            before = ""
+            for name in case.function.split(", "):
+                before = resolved(name, before)
+
+
+def resolved(name, before):
+    """Full name of a function; a short one lies beside the one named before, or in a package above it."""
+    above = before.split(".")[:-1]
+    places = [name] + [".".join((*above[:depth], name)) for depth in range(len(above), 0, -1)]
+    return next(place for place in places if exists(place))
+
+
+def exists(place):
+    try:
+        return callable(resolve_name(place))
+    except (ImportError, AttributeError):
+        return False
