@@ -16,6 +16,10 @@ Symbols
     ``w0x w0y``        drift that does not depend on acceleration (bias), rad/s
     ``wg wk``          g-sensitive drift, direct and quadrature, rad/s per g
     ``a b c d e``      elements of the orientation matrix, paper eq. (14)
+Rooms
+    `calibrate` is the façade; `geometry`, `error_model`, `successive`, `least_squares` and `inputs` are the
+    mathematics of one session. `estimators` solve, `propagation` says what limits the answer, `signals` what a
+    record's mean is worth, `blunders` what went wrong, `positions` what would be worth measuring.
 Arrays hold positions along their first axis; parameters stand in the order of
 `solver.records.PARAMETERS`. "Paper, eq. (n)" is the source of the method; its misprints are
 corrected and listed in `solver.successive`.

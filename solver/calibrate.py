@@ -11,16 +11,16 @@ from typing import Final, Literal
 import numpy as np
 
 from solver import __version__
-from solver.budget import Budget, make_budget
-from solver.conclusion import Solved
 from solver.error_model import Equations, observation_equations
 from solver.errors import InputError, Message, NotConverged, SolverError
-from solver.estimation import least_squares, paper
-from solver.generalised import generalised
+from solver.estimators.conclusion import Solved
+from solver.estimators.estimation import least_squares, paper
+from solver.estimators.generalised import generalised
+from solver.estimators.robust import robust
 from solver.inputs import CommonUncertainty
 from solver.measurement_rule import about_fit, about_measurement
+from solver.propagation.budget import Budget, make_budget
 from solver.records import Estimate, Failure, Method, Observations
-from solver.robust import robust
 
 Asked = Literal["least-squares", "generalised", "robust", "paper", "both"]
 

@@ -4,10 +4,10 @@ import numpy as np
 
 from app.exchange.json_values import Json, finite, message_json
 from app.exchange.si import PARAMETER_UNITS, parameter_lab
-from solver.budget import Budget
-from solver.comparison import Comparison
 from solver.errors import Message
-from solver.monte_carlo import MonteCarlo
+from solver.propagation.budget import Budget
+from solver.propagation.comparison import Comparison
+from solver.propagation.monte_carlo import MonteCarlo
 from solver.records import PARAMETERS, Array
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from app.exchange.json_values import Json, finite, message_json
 from solver import units
-from solver.diagnosis import Diagnosis, Finding
+from solver.blunders.diagnosis import Diagnosis, Finding
 
 
 def diagnosis_json(diagnosis: Diagnosis) -> Json:

@@ -6,8 +6,8 @@ import numpy as np
 
 from app.exchange.json_values import Json, finite, message_json
 from solver import units
-from solver.model_comparison import ModelComparison, TermTest
-from solver.uncertainty import coverage_factor
+from solver.estimators.model_comparison import ModelComparison, TermTest
+from solver.propagation.uncertainty import coverage_factor
 
 TERM_UNITS: Final = {
     "wn": "deg/h/g2",

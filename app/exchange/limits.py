@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from app.exchange.json_values import Json, finite
 from app.exchange.si import parameter_lab
-from solver.budget import Budget
+from solver.propagation.budget import Budget
 from solver.records import PARAMETERS, Array
 
 SOURCE_NAMES: Final = {

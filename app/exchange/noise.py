@@ -5,9 +5,9 @@ from typing import Any, Final
 import numpy as np
 from scipy import special
 
-from solver.channel_noise import ChannelNoise
-from solver.noise_coefficients import Coefficient
-from solver.stationarity import Tested
+from solver.signals.channel_noise import ChannelNoise
+from solver.signals.noise_coefficients import Coefficient
+from solver.signals.stationarity import Tested
 from solver.units import (
     SECONDS_PER_HOUR,
     arcsec_from_rad,

@@ -13,7 +13,7 @@ from app.exchange.rows import CertificateRow
 from app.exchange.si import parameter_si
 from app.exchange.uncertainties import Statement, common_uncertainty
 from solver import units
-from solver.planning import Circumstances, NoiseModel, Places
+from solver.positions.planning import Circumstances, NoiseModel, Places
 from solver.records import PARAMETERS
 
 NOISE_OVER_S: Final = 60.0

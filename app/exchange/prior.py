@@ -8,7 +8,7 @@ import numpy as np
 from app.exchange.parameters import Known, read_parameters
 from app.exchange.problems import refuse
 from app.exchange.si import parameter_si
-from solver.prior import Prior
+from solver.blunders.prior import Prior
 from solver.records import PARAMETERS
 
 

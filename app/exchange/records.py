@@ -15,7 +15,7 @@ from app.exchange.record_files import write_record_csv, write_record_parquet
 from app.exchange.record_places import Place, given, places, position_of, record_name
 from app.exchange.rows import CurrentRecord, MeansRow
 from solver.errors import Message
-from solver.noise import mean_with_uncertainty
+from solver.signals.noise import mean_with_uncertainty
 
 __all__ = [
     "Place",
@@ -101,7 +101,7 @@ def _conditions(metadata: Mapping[str, str]) -> tuple[datetime | None, float | N
 def means_row(record: CurrentRecord) -> MeansRow:
     """Mean currents of a record, with their standard uncertainties, its duration and rate.
 
-    The uncertainty allows for correlated samples (`solver.noise`) and has its degrees of freedom. Both
+    The uncertainty allows for correlated samples (`solver.signals.noise`) and has its degrees of freedom. Both
     are None for a channel that does not change at all, whose noise nobody knows.
 
     Parameters

@@ -10,8 +10,8 @@ from app.exchange.json_values import Json, finite, message_json
 from app.exchange.limits import budget_json, expanded_json, in_lab
 from app.exchange.si import PARAMETER_UNITS, covariance_lab, parameter_lab
 from solver import units
-from solver.budget import Budget
 from solver.calibrate import Asked, Calibration
+from solver.propagation.budget import Budget
 from solver.records import PARAMETERS, Array, Estimate, Failure, Fit, Method, Observations
 
 ResultMethod = Asked

@@ -11,7 +11,7 @@ from app.i18n import gettext, translate
 from app.pages.labels import Mark, symbol_text, unit
 from app.services.noise import Channel, RecordNoise
 from solver.errors import Message
-from solver.noise_coefficients import NAMES, allan_variance
+from solver.signals.noise_coefficients import NAMES, allan_variance
 
 NA_PER_MA: Final = 1e6
 NA_PER_A: Final = 1e9

@@ -17,7 +17,7 @@ from app.services.sessions import measurement_view
 from app.services.views import MeasurementView
 from app.store import measurement, results
 from app.store.tables.measurement import Measurement
-from solver.channel_noise import ChannelNoise, channel_noise
+from solver.signals.channel_noise import ChannelNoise, channel_noise
 from solver.units import ampere_from_ma
 
 Channel = Literal["jx", "jy"]

@@ -8,8 +8,8 @@ from app.errors import Invalid, problem
 from app.exchange.planned import certified_rows, circumstances_si, grid_positions
 from app.exchange.rows import CertificateRow
 from solver.errors import Message
-from solver.planning import Circumstances
-from solver.proposing import CRITERIA
+from solver.positions.planning import Circumstances
+from solver.positions.proposing import CRITERIA
 from solver.records import PARAMETERS
 
 COUNTS: Final = range(4, 17)
@@ -32,7 +32,7 @@ class Asked:
     grid_deg
         Step of the grid to choose from; None to choose among the certificate's positions.
     criterion
-        One of `solver.proposing.CRITERIA`.
+        One of `solver.positions.proposing.CRITERIA`.
     repeats
         Whether a position may be proposed several times.
     time_s, moving_s

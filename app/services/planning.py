@@ -28,9 +28,9 @@ from app.services.plan_views import (
 )
 from app.services.verdicts import judge
 from solver.errors import SolverError
-from solver.pareto import trade_off, uncertainties
-from solver.planning import Circumstances, Prediction, below_method, duration_at, predict
-from solver.proposing import Proposal, best_counts, propose
+from solver.positions.pareto import trade_off, uncertainties
+from solver.positions.planning import Circumstances, Prediction, below_method, duration_at, predict
+from solver.positions.proposing import Proposal, best_counts, propose
 from solver.records import PARAMETERS
 
 TRADE_COUNT: Final = 8

@@ -15,13 +15,13 @@ from app.exchange.result import ResultMethod, calibration_json
 from app.exchange.rows import CertificateRow, MeansRow
 from app.exchange.si import observations
 from app.exchange.uncertainties import common_uncertainty
+from solver.blunders.diagnosis import diagnose
+from solver.blunders.prior import Prior
 from solver.calibrate import Calibration, calibrate
-from solver.diagnosis import diagnose
-from solver.distributions import compare_with_budget, propagate_distributions
 from solver.error_model import observation_equations
 from solver.errors import SolverError
-from solver.model_comparison import compare_models
-from solver.prior import Prior
+from solver.estimators.model_comparison import compare_models
+from solver.propagation.distributions import compare_with_budget, propagate_distributions
 from solver.records import Method
 
 Report = Callable[[float, str], None]

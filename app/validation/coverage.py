@@ -26,9 +26,9 @@ from simdevice.gyro import Gyro
 from simdevice.stand import Stand
 from solver.calibrate import Calibration, calibrate
 from solver.inputs import CommonUncertainty
-from solver.noise import mean_with_uncertainty
+from solver.propagation.uncertainty import coverage_factor
 from solver.records import PARAMETERS, Array, Method, Observations
-from solver.uncertainty import coverage_factor
+from solver.signals.noise import mean_with_uncertainty
 from solver.units import (
     rad_from_arcsec,
     rad_from_deg,
@@ -176,7 +176,7 @@ def _of_means(stated: tuple[Array, Array, Array]) -> Case:
     return Case(
         _RECORDS_NAME,
         marked("Driftbook’s own: records of 60 s at 200 Hz, white noise and noise correlated over 0.1 s"),
-        "solver.noise.mean_with_uncertainty",
+        "solver.signals.noise.mean_with_uncertainty",
         (in_range(marked("share of intervals that hold the true mean"), LEVEL, held, low, high),),
         marked("640 records; the range is that of the share with probability 99.9 %."),
     )

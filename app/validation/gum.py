@@ -9,8 +9,8 @@ from app.i18n import marked
 from app.validation.numbers import load
 from app.validation.report import Check, Group, Progress, as_printed, attempt, in_range
 from solver.least_squares import solve
+from solver.propagation.uncertainty import coverage_factor, propagate
 from solver.records import Array
-from solver.uncertainty import coverage_factor, propagate
 from solver.variance_components import from_summaries
 
 _TITLE: Final = marked("GUM: uncertainty to first order")
@@ -27,18 +27,18 @@ def group(progress: Progress) -> Group:
         attempt(
             marked("H.1: end gauge, effective degrees of freedom"),
             marked("JCGM 100:2008 (GUM), H.1.5 and H.1.6: table H.1 and eq. (G.2b); https://www.bipm.org/en/committees/jc/jcgm/publications"),
-            "solver.uncertainty.propagate", lambda: _end_gauge(data["h1"]),
+            "solver.propagation.uncertainty.propagate", lambda: _end_gauge(data["h1"]),
         ),
         attempt(
             marked("H.2: resistance and reactance measured at once, correlated"),
             marked("JCGM 100:2008 (GUM), H.2, tables H.2 and H.3; https://www.bipm.org/en/committees/jc/jcgm/publications"),
-            "solver.uncertainty.propagate", lambda: _impedance(data["h2"]),
+            "solver.propagation.uncertainty.propagate", lambda: _impedance(data["h2"]),
             marked("The GUM goes on with rounded values; without that u(X) is 0.2956 Ω: a unit of the last place."),
         ),
         attempt(
             marked("H.3: calibration of a thermometer, line with correlated coefficients"),
             marked("JCGM 100:2008 (GUM), H.3, table H.6; https://www.bipm.org/en/committees/jc/jcgm/publications"),
-            "solver.least_squares.solve, solver.uncertainty.propagate", lambda: _thermometer(data["h3"]),
+            "solver.least_squares.solve, solver.propagation.uncertainty.propagate", lambda: _thermometer(data["h3"]),
         ),
         attempt(
             marked("H.5: Zener voltage standard, analysis of variance"),
@@ -49,7 +49,7 @@ def group(progress: Progress) -> Group:
         attempt(
             marked("Student’s t, table G.2"),
             marked("JCGM 100:2008 (GUM), table G.2; https://www.bipm.org/en/committees/jc/jcgm/publications"),
-            "solver.uncertainty.coverage_factor", lambda: _student(data["g2"]),
+            "solver.propagation.uncertainty.coverage_factor", lambda: _student(data["g2"]),
         ),
     )  # fmt: skip
     return Group("gum", _TITLE, cases)

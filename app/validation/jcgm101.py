@@ -16,13 +16,13 @@ import numpy as np
 from app.i18n import marked
 from app.validation.numbers import load
 from app.validation.report import Check, Group, Progress, as_printed, attempt, holds, in_range
-from solver.comparison import compare
-from solver.monte_carlo import Model, MonteCarlo, numerical_tolerance, run
+from solver.propagation.comparison import compare
+from solver.propagation.monte_carlo import Model, MonteCarlo, numerical_tolerance, run
+from solver.propagation.uncertainty import propagate
 from solver.records import Array
-from solver.uncertainty import propagate
 
-_RUN: Final = "solver.monte_carlo.run"
-_COMPARED: Final = "solver.monte_carlo.run, solver.uncertainty.propagate, solver.comparison.compare"
+_RUN: Final = "solver.propagation.monte_carlo.run"
+_COMPARED: Final = f"{_RUN}, uncertainty.propagate, comparison.compare"
 _STABLE: Final = 2.0 / 5.0
 _FIRST: Final = marked("GUM, first order")
 _COMPARISON: Final = marked("comparison with the GUM")

@@ -8,8 +8,8 @@ import numpy as np
 from app.i18n import marked
 from app.validation.numbers import load
 from app.validation.report import Check, Group, Progress, as_printed, attempt
-from solver.allan import allan_deviation
 from solver.records import Array
+from solver.signals.allan import allan_deviation
 
 _TITLE: Final = marked("NBS14: Allan deviation")
 
@@ -18,7 +18,7 @@ def group(progress: Progress) -> Group:
     """Compute both suites."""
     data = load("allan")
     progress(0.0, _TITLE)
-    function = "solver.allan.allan_deviation"
+    function = "solver.signals.allan.allan_deviation"
     cases = (
         attempt(
             marked("Nine values of frequency"),

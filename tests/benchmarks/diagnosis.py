@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.diagnosis import diagnose
+from solver.blunders.diagnosis import diagnose
 from tests.solver.blundered import (
     INVISIBLE,
     VISIBLE,

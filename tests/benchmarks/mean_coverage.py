@@ -16,7 +16,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from scipy import signal, special
 
-from solver.noise import Mean, batch_means, mean_by_correlation, mean_with_uncertainty
+from solver.signals.noise import Mean, batch_means, mean_by_correlation, mean_with_uncertainty
 
 SAMPLES, RATE_HZ = 12_000, 200.0
 Make = Callable[[np.random.Generator], tuple[np.ndarray, float]]

@@ -21,15 +21,15 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from solver.budget import make_budget
 from solver.calibrate import calibrate
-from solver.conclusion import Solved
 from solver.constants import EARTH_RATE
-from solver.distributions import compare_with_budget, propagate_distributions
 from solver.error_model import currents
+from solver.estimators.conclusion import Solved
+from solver.estimators.rate_noise import whitening_of
 from solver.geometry import case_orientation, elements
 from solver.inputs import COMMON, CommonUncertainty
-from solver.rate_noise import whitening_of
+from solver.propagation.budget import make_budget
+from solver.propagation.distributions import compare_with_budget, propagate_distributions
 from solver.records import Array, Observations
 from solver.units import rad_from_arcsec, rad_per_s_from_deg_per_h, scale_from_deg_per_h_per_ma
 

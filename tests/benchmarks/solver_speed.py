@@ -19,9 +19,9 @@ from collections.abc import Callable
 import numpy as np
 from scipy import optimize
 
-from solver.batch import Stand, solve_sessions
 from solver.calibrate import calibrate
 from solver.error_model import Equations, currents, design_matrix, observation_equations, scale_matrix
+from solver.estimators.batch import Stand, solve_sessions
 from solver.geometry import case_orientation, elements
 from solver.least_squares import column_scale, estimate, solve, solve_batch
 from solver.records import Array, Observations

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.diagnosis import Diagnosis, Finding
-from solver.prior import Prior
+from solver.blunders.diagnosis import Diagnosis, Finding
+from solver.blunders.prior import Prior
 from solver.records import Observations
 from tests.solver.sessions import LAB, Setup, grid
 

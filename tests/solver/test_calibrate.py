@@ -199,7 +199,7 @@ def test_zero_currents_are_refused(rng):
 
 
 def test_lab_units_of_the_tests_are_those_of_the_product():
-    from solver.observability import lab_units
+    from solver.estimators.observability import lab_units
 
     # Two roundings apart at most.
     np.testing.assert_allclose(lab_units(truth()), truth() / LAB, rtol=4e-16)

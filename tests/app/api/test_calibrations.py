@@ -67,7 +67,9 @@ def test_a_result_is_the_solvers_own(client: httpx.Client, means: list[dict[str,
     found = solved(client, session_id)
     rows = [MeansRow(**row) for row in means]
     certificate = [CertificateRow(theta, psi, 6.9, -16.4, 6.6) for theta, psi in GRID]
-    direct = json.loads(dumps(calibration_json(calibrate(observations(rows, certificate, 55.7558), "both"), "both")))
+    direct = json.loads(
+        dumps(calibration_json(calibrate(observations(rows, certificate, 55.7558), "both"), "both"))
+    )
     for method in ("least-squares", "paper"):
         assert {name: found[method][name] for name in direct[method]} == direct[method]
     assert found["input_hash"] == direct["input_hash"]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from app.exchange.examination import diagnosis_json
-from solver.diagnosis import Diagnosis, Finding
+from solver.blunders.diagnosis import Diagnosis, Finding
 from solver.errors import Message
 
 

@@ -5,8 +5,8 @@ import pytest
 
 from app.exchange.further_terms import TERM_UNITS, model_json
 from solver.errors import Message
-from solver.model_comparison import ModelComparison, TermTest
-from solver.terms import TERMS
+from solver.estimators.model_comparison import ModelComparison, TermTest
+from solver.estimators.terms import TERMS
 
 PER_H = np.pi / 180 / 3600
 """One °/h in rad/s, from the definition."""

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from app.exchange.limits import SOURCE_NAMES, budget_json, expanded_json
-from solver.budget import CORRELATION, SCATTER, Budget
 from solver.inputs import SOURCES
+from solver.propagation.budget import CORRELATION, SCATTER, Budget
 from solver.records import PARAMETERS
 
 # One °/h/mA and one °/h in SI, from the definitions: π/180/3600 rad/s, mA = 1e-3 A.

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.exchange.noise import noise_document
-from solver.channel_noise import channel_noise
+from solver.signals.channel_noise import channel_noise
 
 AMPERE_NOISE = 1e-8
 INTERVAL_S = 0.005

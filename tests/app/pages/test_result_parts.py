@@ -5,16 +5,17 @@ from types import SimpleNamespace
 from app.pages.result_findings import TITLES, findings, not_excluded
 from app.pages.result_limits import SOURCES, Budget
 from app.pages.result_tests import TERMS, Model, MonteCarlo
-from solver.budget import CORRELATION, SCATTER
+from solver.estimators.terms import TERMS as SOLVER_TERMS
 from solver.inputs import SOURCES as LINES
+from solver.propagation.budget import CORRELATION, SCATTER
 from solver.records import PARAMETERS
-from solver.terms import TERMS as SOLVER_TERMS
 
 # The interface's codes of blunders, and the one for what none of them explains.
 CODES = (
-    "outlier positions-swapped position-wrong angle-unit channel-stuck channel-saturated warm-up channels-swapped "
-    "channel-sign latitude-sign latitude-complement psi-reversed theta-reversed current-unit unexplained"
-).split()
+    "outlier", "positions-swapped", "position-wrong", "angle-unit", "channel-stuck", "channel-saturated",
+    "warm-up", "channels-swapped", "channel-sign", "latitude-sign", "latitude-complement",
+    "psi-reversed", "theta-reversed", "current-unit", "unexplained",
+)  # fmt: skip
 
 
 def line(code, share):

@@ -8,7 +8,7 @@ from scipy import stats
 
 from app.validation import gum
 from app.validation.numbers import load
-from solver import uncertainty
+from solver.propagation import uncertainty
 
 DATA = load("gum")
 

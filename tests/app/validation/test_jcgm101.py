@@ -6,7 +6,7 @@ from scipy import stats
 
 from app.validation import jcgm101
 from app.validation.numbers import load
-from solver import monte_carlo
+from solver.propagation import monte_carlo
 
 DATA = load("jcgm101")
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from app.validation import nbs14
 from app.validation.numbers import load
-from solver import allan
+from solver.signals import allan
 
 
 def test_the_generator_begins_as_published():

@@ -1,0 +1,1 @@
+"""Noise of a sampled current: what its mean is worth, whether it stands still, Allan deviation, coefficients."""
