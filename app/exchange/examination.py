@@ -32,7 +32,7 @@ def _finding(finding: Finding) -> Json:
 
 
 def _details(details: Mapping[str, Any]) -> Json:
-    """Write a finding's details: angles in degrees, members of its class as they are."""
+    """Write a finding's details in laboratory units, members of its class likewise."""
     plain: Json = {}
     for name, value in details.items():
         if name == "positions":
@@ -41,6 +41,12 @@ def _details(details: Mapping[str, Any]) -> Json:
             plain[name] = _positions([value])[0]
         elif name == "equivalents":
             plain[name] = [_details(item) for item in value]
+        elif name in ("value", "limit"):
+            plain[f"{name}_ma"] = finite(units.ma_from_ampere(float(value)))
+        elif name == "drift":
+            plain["drift_x_deg_per_h"], plain["drift_y_deg_per_h"] = (
+                finite(units.deg_per_h_from_rad_per_s(float(rate))) for rate in value
+            )
         else:
             plain[name] = finite(value) if isinstance(value, float) else value
     return plain

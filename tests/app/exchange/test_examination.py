@@ -47,3 +47,13 @@ def test_without_stated_noise_there_is_no_chi_square() -> None:
     finding = Finding("outlier", Message("outlier", "One."), ((0.0, 0.0),), None, None)
     (found,) = diagnosis_json(Diagnosis((finding,)))["diagnosis"]
     assert (found["chi2_before"], found["chi2_after"], found["advice"]) == (None, None, None)
+
+
+def test_currents_and_drifts_come_in_laboratory_units() -> None:
+    one_deg_per_h = np.pi / 180 / 3600
+    details = {"channel": "y", "value": 2e-6, "limit": 5e-6, "drift": (one_deg_per_h, -2 * one_deg_per_h)}
+    finding = Finding("channel-stuck", Message("x", "Stuck."), (), 1.0, 1.0, details)
+    (found,) = diagnosis_json(Diagnosis((finding,)))["diagnosis"]
+    assert (found["value_ma"], found["limit_ma"]) == (2e-3, 5e-3)
+    assert (found["drift_x_deg_per_h"], found["drift_y_deg_per_h"]) == (1.0, -2.0)
+    assert {"value", "limit", "drift"}.isdisjoint(found)
