@@ -30,7 +30,8 @@ class CalibrationPart(Part):
 def solve(session_id: Id, body: NewCalibration, caller: Uploader, response: Response) -> Job:
     """Ask for a calibration of what is measured now; the same while it waits or runs is the same job."""
     with caller.write() as work:
-        job = calibrations.request(work, session_id, body.method, body.monte_carlo, body.seed)
+        trials = None if body.monte_carlo == "adaptive" else body.monte_carlo
+        job = calibrations.request(work, session_id, body.method, trials, body.seed)
     response.headers["location"] = links.job(job.id)
     return Job.model_validate(job)
 

@@ -53,8 +53,8 @@ def solve(
         typer.Option("--prior", help="What the gyro is expected to be: parameters with u (JSON)."),
     ] = None,
     monte_carlo: Annotated[
-        int, typer.Option("--monte-carlo", min=0, help="Draws to propagate the distributions by; 0 for none.")
-    ] = 0,
+        str, typer.Option("--monte-carlo", help="Draws to propagate the distributions by, or adaptive.")
+    ] = "0",
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of these draws.")] = 0,
     as_json: Annotated[bool, typer.Option("--json", help="For programs: one JSON object per item.")] = False,
 ) -> None:
@@ -63,7 +63,7 @@ def solve(
     stated = Stated(
         uncertainties=read_uncertainties(_bytes(uncertainties), str(uncertainties)) if uncertainties else {},
         prior=_prior(prior) if prior else None,
-        trials=monte_carlo,
+        trials=_trials(monte_carlo),
         seed=seed,
     )
     every = list(items(currents))
@@ -88,6 +88,16 @@ def solve(
 
 def _certificate(path: Path) -> list[CertificateRow]:
     return read_certificate(_bytes(path), str(path))[0]
+
+
+def _trials(text: str) -> int | None:
+    """Number of draws; None for as many as are needed."""
+    if text == "adaptive":
+        return None
+    if not (text.isascii() and text.isdigit() and len(text) < 10):
+        raise Invalid(problem("bad-trials", "“%(text)s” is no number of draws. Give a whole number, or adaptive.",
+                              column="--monte-carlo", text=text[:40]))  # fmt: skip
+    return int(text)
 
 
 def _prior(path: Path) -> dict[str, Any]:

@@ -51,7 +51,7 @@ def monte_carlo_json(values: Array, budget: Budget, found: MonteCarlo, compared:
     }
 
 
-def no_monte_carlo_json(trials: int, seed: int, why: Message) -> Json:
+def no_monte_carlo_json(trials: int | None, seed: int, why: Message) -> Json:
     """Write why no draws could be made."""
     return {
         "trials": trials,

@@ -19,7 +19,7 @@ from app.services.sessions import NewSession
 from app.services.views import MeasurementView, SessionDetail, SessionView
 
 router = APIRouter()
-_TRIALS: Final = (0, calibrations.TRIALS, 10 * calibrations.TRIALS)
+_TRIALS: Final = ("0", str(calibrations.TRIALS), "1000000", "adaptive")
 
 STATES: Final = ("measuring", "ready", "solving", "failed", "solved")
 _PER_PAGE: Final = 50
@@ -123,7 +123,7 @@ def show(
         request, "sessions/detail.html", status=status, detail=found, session=found.session,
         map=position_map(found), superseded=_superseded(found), anchor=anchor, form=form or Form(),
         warnings=warnings, measured=[row for row in found.positions if _counts(row.measurement)],
-        methods=calibrations.METHODS[::-1], trials=_TRIALS, usual_trials=calibrations.TRIALS,
+        methods=calibrations.METHODS[::-1], trials=_TRIALS, usual_trials=str(calibrations.TRIALS),
     )  # fmt: skip
 
 
@@ -143,11 +143,18 @@ def solve(request: Request, person: Writer, lab: TheLab, session_id: int, sent: 
     """Ask for the calibration and watch it."""
     form = Form.of(sent, "method", "monte_carlo")
     fields = Fields(form)
-    trials = fields.whole("monte_carlo") if form.value("monte_carlo") else calibrations.TRIALS
+    trials = _draws(fields, form.value("monte_carlo"))
     fields.check()
     with lab.write(person) as work:
         job = calibrations.request(work, session_id, form.value("method") or "both", trials)
     return see(f"/jobs/{job.id}")
+
+
+def _draws(fields: Fields, said: str) -> int | None:
+    """Draws of the Monte Carlo check; None for as many as are needed."""
+    if said == "adaptive":
+        return None
+    return fields.whole("monte_carlo") if said else calibrations.TRIALS
 
 
 def _counts(measurement: MeasurementView | None) -> bool:

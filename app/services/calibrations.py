@@ -27,7 +27,7 @@ MOST_TRIALS: Final = 10_000_000
 
 
 def request(
-    work: Work, session_id: int, method: str = "both", trials: int = TRIALS, seed: int = 0
+    work: Work, session_id: int, method: str = "both", trials: int | None = TRIALS, seed: int = 0
 ) -> JobView:
     """Ask for a calibration from the measurements that count now.
 
@@ -36,7 +36,8 @@ def request(
     Parameters
     ----------
     trials, seed
-        Draws of the Monte Carlo propagation of the uncertainty (0 for none), and of its random numbers.
+        Draws of the Monte Carlo propagation of the uncertainty (0 for none, None for as many as two digits
+        of u need), and of its random numbers.
 
     Raises
     ------
@@ -47,7 +48,7 @@ def request(
     if method not in METHODS:
         raise Invalid(problem("unknown-method", "There is no method “%(method)s”. Choose one of %(methods)s.",
                               column="method", method=method, methods=", ".join(METHODS)))  # fmt: skip
-    if not (trials == 0 or FEWEST_TRIALS <= trials <= MOST_TRIALS):
+    if trials and not FEWEST_TRIALS <= trials <= MOST_TRIALS:
         raise Invalid(problem("bad-trials", "The number of trials is 0 for none, or from %(fewest)d to %(most)d.",
                               column="monte_carlo", fewest=FEWEST_TRIALS, most=MOST_TRIALS))  # fmt: skip
     if not 0 <= seed < 2**63:

@@ -38,14 +38,14 @@ class Stated:
     prior
         What the gyro is expected to be, with its source (`app.services.priors`); None when nothing is.
     trials
-        Draws of the Monte Carlo propagation; 0 for none.
+        Draws of the Monte Carlo propagation; 0 for none, None for as many as two digits of u need.
     seed
         Of its random numbers.
     """
 
     uncertainties: Mapping[str, Any] = field(default_factory=dict)
     prior: Mapping[str, Any] | None = None
-    trials: int = 0
+    trials: int | None = 0
     seed: int = 0
 
 
@@ -97,9 +97,9 @@ def solved(
 
 def _distributions(calibration: Calibration, stated: Stated, report: Report) -> dict[Method, Json]:
     """The Monte Carlo propagation of each method's estimate; why there is none where it cannot be made."""
-    if not stated.trials:
+    if stated.trials == 0:
         return {}
-    digits = 2 if stated.trials >= TRIALS_FOR_TWO_DIGITS else 1
+    digits = 2 if stated.trials is None or stated.trials >= TRIALS_FOR_TWO_DIGITS else 1
     told: dict[Method, Json] = {}
     for number, (name, solved) in enumerate(calibration.solved.items()):
 

@@ -88,7 +88,10 @@ class NewCalibration(Incoming):
 
     method: METHODS = "both"
     monte_carlo: Annotated[
-        int, Field(strict=True, ge=0, description="Draws to propagate the distributions by; 0 for none.")
+        Annotated[int, Field(strict=True, ge=0)] | Literal["adaptive"],
+        Field(
+            description="Draws to propagate the distributions by: 0 for none, adaptive for as many as needed."
+        ),
     ] = TRIALS
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63, description="Of these draws.")] = 0
 

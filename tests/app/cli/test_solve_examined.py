@@ -163,6 +163,13 @@ def test_draws_confirm_the_first_order_and_equal_seeds_give_equal_bytes(driftboo
         assert entry["shortest"][1] - entry["shortest"][0] <= high - low
 
 
+def test_as_many_draws_as_needed(driftbook, case):
+    found = solve(driftbook, case, "--monte-carlo", "adaptive")["monte_carlo"]
+    # JCGM 101, 7.9.4: at least ten blocks of 10⁴; two digits of u take some hundred thousands
+    assert found["trials"] >= 100_000
+    assert found["verdict"] in ("agree", "disagree", "open")
+
+
 @pytest.mark.parametrize("method", ["robust", "generalised"])
 def test_further_methods_agree_with_least_squares_on_good_data(driftbook, case, method):
     plain, other = solve(driftbook, case), solve(driftbook, case, "--method", method)
@@ -210,6 +217,13 @@ def test_a_bad_file_is_one_line_and_exit_code_2(driftbook, case, option, text, w
     assert len(done.err.strip().splitlines()) == 1
     assert "bad.json" in done.err
     assert words in done.err
+
+
+def test_no_number_of_draws_is_one_line(driftbook, case):
+    done = driftbook("solve", case / "currents.csv", "--certificate", case / "certificate.csv",
+                     "--latitude", LATITUDE_DEG, "--monte-carlo", "many")  # fmt: skip
+    assert (done.code, len(done.err.strip().splitlines())) == (2, 1)
+    assert "many" in done.err
 
 
 def test_the_table_tells_of_the_diagnosis_and_the_draws(driftbook, case):
