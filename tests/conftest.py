@@ -1,5 +1,10 @@
 """What every test stands on."""
 
+import os
+
+# Tests run side by side; threads of the linear algebra would only wait for each other's processors.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 from importlib.util import find_spec
 
 from hypothesis import HealthCheck, settings
