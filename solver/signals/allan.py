@@ -30,6 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 from solver.errors import InputError, Message
+from solver.signals.noise import checked_interval
 from solver.signals.noise_type import FEWEST_TO_IDENTIFY, noise_exponent
 
 Array = NDArray[np.float64]
@@ -151,8 +152,7 @@ def allan(
         As `allan_deviation`; also when the interval is not positive.
     """
     values = _values(samples)
-    if not interval > 0.0:
-        raise InputError(Message("bad-interval", "The time between samples must be greater than zero."))
+    checked_interval(interval)
     n = len(values)
     chosen = octave_factors(n) if factors is None else np.asarray(factors, dtype=np.int64)
     phase = _phase(values)

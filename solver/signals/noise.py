@@ -154,6 +154,13 @@ def checked(samples: ArrayLike) -> Array:
     return values
 
 
+def checked_interval(interval: float) -> float:
+    """The time between samples, which must be positive."""
+    if not interval > 0.0:
+        raise InputError(Message("bad-interval", "The time between samples must be greater than zero."))
+    return interval
+
+
 def is_constant(values: Array) -> bool:
     """Whether all samples are equal."""
     return bool(np.min(values) == np.max(values))

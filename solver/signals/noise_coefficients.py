@@ -37,7 +37,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 from solver.errors import InputError, Message
-from solver.signals.noise import Array, checked, cosine_powers, is_constant
+from solver.signals.noise import Array, checked, checked_interval, cosine_powers, is_constant
 
 Name = Literal["quantisation", "angle_random_walk", "bias_instability", "rate_random_walk"]
 NAMES: Final[tuple[Name, ...]] = (
@@ -162,8 +162,7 @@ def noise_coefficients(
         raise InputError(
             Message("too-few-samples", "Noise coefficients need at least %(n)d samples.", {"n": FEWEST})
         )
-    if not interval > 0.0:
-        raise InputError(Message("bad-interval", "The time between samples must be greater than zero."))
+    checked_interval(interval)
     if is_constant(values):
         return None
     values = values[-_smooth(len(values)) :]

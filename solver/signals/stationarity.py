@@ -20,7 +20,15 @@ from numpy.typing import ArrayLike
 from scipy import special
 
 from solver.errors import InputError, Message
-from solver.signals.noise import Array, Mean, checked, is_constant, mean_with_uncertainty, slow_cosines
+from solver.signals.noise import (
+    Array,
+    Mean,
+    checked,
+    checked_interval,
+    is_constant,
+    mean_with_uncertainty,
+    slow_cosines,
+)
 
 FEWEST: Final = 128
 """Samples that both halves need to be judged for correlation themselves."""
@@ -108,8 +116,7 @@ def stationarity(samples: ArrayLike, interval: float) -> Stationarity | None:
         raise InputError(
             Message("too-few-samples", "A test for drift needs at least %(n)d samples.", {"n": FEWEST})
         )
-    if not interval > 0.0:
-        raise InputError(Message("bad-interval", "The time between samples must be greater than zero."))
+    checked_interval(interval)
     middle = len(values) // 2
     halves = values[:middle], values[middle:]
     if any(is_constant(half) for half in halves):
