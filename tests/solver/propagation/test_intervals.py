@@ -79,7 +79,9 @@ def test_symmetric_interval_of_known_quantiles(level):
 
 
 @pytest.mark.parametrize("level", LEVELS)
-@pytest.mark.parametrize("distribution", [stats.expon(), stats.chi2(3), stats.chi2(8)], ids=str)
+@pytest.mark.parametrize(
+    "distribution", [stats.expon(), stats.chi2(3), stats.chi2(8)], ids=("exponential", "chi2-3", "chi2-8")
+)
 def test_shortest_interval_of_skewed_distributions(distribution, level):
     """Its ends have equal density (5.3.4, note), or it begins at the mode at the edge."""
     probability = (np.arange(200_000) + 0.5) / 200_000
