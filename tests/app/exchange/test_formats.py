@@ -108,7 +108,11 @@ def test_big_endian_and_single_precision_arrays() -> None:
 
 
 @pytest.mark.parametrize("size", [0.5, 0.9, 0.99])
-@pytest.mark.parametrize("data", [gzip.compress(MEANS), zstd(MEANS), parquet(COLUMNS), npz(**COLUMNS)])
+@pytest.mark.parametrize(
+    "data",
+    [gzip.compress(MEANS), zstd(MEANS), parquet(COLUMNS), npz(**COLUMNS)],
+    ids=["gzip", "zstd", "parquet", "npz"],
+)
 def test_a_file_cut_short_is_damaged(data: bytes, size: float) -> None:
     assert code_of(read_means, data[: int(len(data) * size)]) in {"damaged", "not-a-table"}
 
