@@ -19,6 +19,9 @@ WAYS = {
     "phone-dark-en": {"viewport": {"width": 390, "height": 844}, "color_scheme": "dark", "locale": "en-GB"},
 }
 
+EXAMINED = ("desk-light-en", "phone-dark-en")
+"""Ways in which axe looks at each page: both themes, both sizes. A language changes no role and no contrast."""
+
 
 @pytest.mark.parametrize("way", WAYS)
 def test_every_page_keeps_the_policy_and_is_open_to_everybody(
@@ -31,7 +34,8 @@ def test_every_page_keeps_the_policy_and_is_open_to_everybody(
         page.goto(demonstration.url + path)
         for chart in page.locator("[data-chart]").all():
             chart.locator("svg").first.wait_for()
-        accessible(page)
+        if way in EXAMINED:
+            accessible(page)
         screenshot(page, way + path.replace("/", "_").replace("?", "_"))
         if page.evaluate("document.documentElement.scrollWidth > document.documentElement.clientWidth"):
             wide.append(path)
