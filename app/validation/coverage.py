@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal, special
+from scipy import special
 
 from app.i18n import marked
 from app.validation.report import Case, Check, Group, Progress, in_range
@@ -138,6 +138,8 @@ def variance_of_mean() -> float:
 
 def noise_records(rng: np.random.Generator, count: int) -> Array:
     """Records of noise, (count, 12,000); their means have the variance 1."""
+    from scipy import signal  # slow to import, and only this study needs it
+
     phi = _memory()
     settled = round(10 * _CORRELATION_TIME * _RATE)
     shocks = rng.standard_normal((count, _SAMPLES + settled)) * (1 - phi**2) ** 0.5
