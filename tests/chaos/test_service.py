@@ -114,7 +114,9 @@ class Stand(threading.Thread):
                 }
                 self._send("PUT", place + "/means", json=body)
                 self.done.means.setdefault(session, {})[theta, psi] = jx_ma
-        job = self._send("POST", f"/sessions/{session}/calibrations", json={"method": "both", "monte_carlo": 0})
+        job = self._send(
+            "POST", f"/sessions/{session}/calibrations", json={"method": "both", "monte_carlo": 0}
+        )
         self.done.jobs[job["id"]] = session
 
     def _record(self, theta: int, psi: int) -> bytes:
