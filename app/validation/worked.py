@@ -9,6 +9,7 @@ from the rounded currents in the same arithmetic.
 
 import hashlib
 from collections.abc import Iterator, Mapping
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -61,7 +62,7 @@ def group(progress: Progress) -> Group:
                 _NAMES[case["key"]],
                 _SOURCE,
                 _FUNCTION,
-                lambda compute=compute, case=case: compute(case),  # type: ignore[misc]
+                partial(compute, case),
             )
         )
     noisy = load("worked")["cases"][-1]

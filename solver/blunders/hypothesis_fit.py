@@ -214,11 +214,11 @@ def _whitening(data: Data, inverse: Array, others: Array | None) -> Array:
     """W with Wᵀ·W = V⁻¹: (N, n, 2, 2) where positions are independent, else (N, 2n, 2n)."""
     count, n, _ = data.x.shape
     blown = np.where(data.missing, _DISBELIEVED, 1.0)
-    if data.u is not None and others is None:
-        return np.asarray((1.0 / (data.u * blown))[..., None] * np.eye(2))
     if data.u is None:  # V = K⁻¹·K⁻ᵀ, whose root needs no factorisation
         return np.asarray(np.linalg.inv(inverse)[:, None] / (UNTOLD * blown[..., None, :]))
-    left = (inverse[:, None] @ others.reshape(n, 2, -1)).reshape(count, 2 * n, 2 * n)  # type: ignore[union-attr]
+    if others is None:
+        return np.asarray((1.0 / (data.u * blown))[..., None] * np.eye(2))
+    left = (inverse[:, None] @ others.reshape(n, 2, -1)).reshape(count, 2 * n, 2 * n)
     covariance = (inverse[:, None] @ np.swapaxes(left, 1, 2).reshape(count, n, 2, -1)).reshape(left.shape)
     covariance = (covariance + np.swapaxes(covariance, 1, 2)) / 2
     diagonal = np.arange(2 * n)
