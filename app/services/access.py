@@ -7,6 +7,7 @@ random bits, so a slow hash would add nothing) and passwords as argon2 hashes.
 import hashlib
 import secrets
 from datetime import datetime, timedelta
+from functools import cache
 from typing import Final
 
 from pwdlib import PasswordHash
@@ -34,7 +35,12 @@ NOBODY: Final = Person("", "", "", frozenset())
 _IDLE: Final = timedelta(days=7)
 _SEEN_STEP: Final = timedelta(minutes=5)
 _hasher = PasswordHash((Argon2Hasher(),))
-_UNKNOWN_ACCOUNT_HASH: Final = _hasher.hash(secrets.token_hex())
+
+
+@cache
+def _unknown_account_hash() -> str:
+    """A hash that no password has: an unknown name takes as long to refuse as a wrong password."""
+    return _hasher.hash(secrets.token_hex())
 
 
 def add_account(work: Work, name: str, role: str, password: str | None = None, full_name: str = "") -> Person:
@@ -116,7 +122,7 @@ def sign_in(work: Work, name: str, password: str) -> str:
     account = people.account(work.db, name)
     known = account is not None and account.password_hash is not None and account.disabled_at is None
     stored = account.password_hash if account is not None and account.password_hash and known else None
-    if not _hasher.verify(password, stored or _UNKNOWN_ACCOUNT_HASH) or account is None or not known:
+    if not _hasher.verify(password, stored or _unknown_account_hash()) or account is None or not known:
         raise Unauthenticated(
             problem("bad-password", "Name and password do not fit together.", column="password")
         )
