@@ -24,6 +24,7 @@ _WHERE: Final = {
     "solve": "solve:solve",
     "plan": "plan:plan",
     "simulate": "simulate:simulate",
+    "simdevice": "simdevice:simdevice",
     "upload": "upload:upload",
     "user": "accounts:users",
     "token": "accounts:tokens",

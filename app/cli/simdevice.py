@@ -1,0 +1,119 @@
+"""Simulated instruments on TCP ports."""
+
+import asyncio
+import signal
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from importlib.metadata import version
+from typing import Annotated
+
+import typer
+
+from app.errors import Invalid, problem
+from simdevice.ammeter_device import AmmeterDevice
+from simdevice.bench import Bench
+from simdevice.clock import Clock
+from simdevice.laboratory import Laboratory
+from simdevice.scenarios import SCENARIOS
+from simdevice.scpi.instrument import Instrument
+from simdevice.serving import listening
+from simdevice.stand_device import StandDevice
+from solver.units import rad_from_deg
+
+_HELP = "; ".join(f"{item.name}: {item.summary}" for item in SCENARIOS.values())
+_STOP_SIGNALS = ("SIGINT", "SIGTERM", "SIGBREAK")
+"""Those of these that the system has end the instruments; the last is Windows' Ctrl-Break."""
+_STOP_WAITS_S = 0.1
+"""Windows wakes no event loop for a signal, so the loop wakes by itself."""
+
+simdevice = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
+
+
+@simdevice.callback()
+def _simdevice() -> None:
+    """Simulated stand and ammeter."""
+
+
+@simdevice.command()
+def serve(
+    stand_port: Annotated[
+        int, typer.Option("--stand-port", min=0, max=65535, help="0: any free one.")
+    ] = 5025,
+    ammeter_port: Annotated[int, typer.Option("--ammeter-port", min=0, max=65535, help="Likewise.")] = 5026,
+    host: Annotated[str, typer.Option("--host", help="Address to listen on.")] = "127.0.0.1",
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Everything random comes from it.")] = 0,
+    scenario: Annotated[str, typer.Option("--scenario", help=_HELP)] = "gvk-6",
+    speed: Annotated[
+        float, typer.Option("--speed", min=0.001, max=1e6, help="Seconds of the laboratory in one second.")
+    ] = 1.0,
+    latitude: Annotated[
+        float | None, typer.Option("--latitude", min=-90, max=90, help="Degrees, south negative.")
+    ] = None,
+    duration: Annotated[
+        float, typer.Option("--duration", min=0.01, max=3600, help="Of a record in the session's plan, s.")
+    ] = 60.0,
+    rate: Annotated[
+        float, typer.Option("--rate", min=1, max=20000, help="Samples per second there.")
+    ] = 200.0,
+    powered_on: Annotated[
+        str | None,
+        typer.Option("--powered-on", help="Moment of the gyro's power-on, ISO 8601; default: now."),
+    ] = None,
+) -> None:
+    """Serve a simulated stand and ammeter as SCPI instruments until Ctrl-C."""
+    bench = _bench(scenario, seed, latitude, rate, duration)
+    laboratory = Laboratory(bench, Clock(_moment(powered_on), speed))
+    devices = [
+        device(laboratory, f"Driftbook,{model},{seed},{version('driftbook')}")
+        for device, model in ((StandDevice, "SIM-STAND"), (AmmeterDevice, "SIM-AMMETER"))
+    ]
+    asyncio.run(_serve([Instrument(device) for device in devices], host, [stand_port, ammeter_port]))
+
+
+async def _serve(instruments: Sequence[Instrument], host: str, ports: Sequence[int]) -> None:
+    stop = False
+
+    def end(*_: object) -> None:
+        nonlocal stop
+        stop = True
+
+    for name in _STOP_SIGNALS:
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), end)
+    async with listening(instruments, host, ports) as bound:
+        stand, ammeter = (f"TCPIP0::{host}::{port}::SOCKET" for port in bound)
+        typer.echo(f"listening: stand {stand} ammeter {ammeter}")
+        while not stop:
+            await asyncio.sleep(_STOP_WAITS_S)
+
+
+def _bench(name: str, seed: int, latitude: float | None, rate: float, duration: float) -> Bench:
+    if name not in SCENARIOS:
+        raise Invalid(problem("unknown-scenario", "There is no scenario %(name)s. There are: %(names)s.",
+                              column="--scenario", name=name, names=", ".join(SCENARIOS)))  # fmt: skip
+    bench = replace(SCENARIOS[name].bench(seed), rate=rate, duration=duration)
+    if latitude is None:
+        return bench
+    return replace(bench, stand=replace(bench.stand, latitude=rad_from_deg(latitude)))
+
+
+def _moment(text: str | None) -> float:
+    """A moment as seconds since 1970; without an offset it is UTC."""
+    if text is None:
+        return time.time()
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        raise Invalid(
+            problem("bad-moment", "“%(text)s” is no moment; write it like 2026-11-22T09:00:00Z.",
+                    column="--powered-on", text=text)
+        ) from None  # fmt: skip
+    seconds = (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+    if seconds > time.time():
+        raise Invalid(
+            problem("future-moment", "The gyro cannot be powered on in the future; %(text)s is to come.",
+                    column="--powered-on", text=text)
+        )  # fmt: skip
+    return seconds
