@@ -25,6 +25,7 @@ from app.api import (
     sessions,
     simulations,
     stands,
+    station,
     types,
     uploads,
     validation,
@@ -41,7 +42,7 @@ _DESCRIPTION: Final = (
 )
 _NOUNS: Final = (
     gyros, history, types, stands, planning, certificates, uploads, sessions, positions, calibrations, simulations,
-    jobs, validation, docs,
+    station, jobs, validation, docs,
 )  # fmt: skip
 
 

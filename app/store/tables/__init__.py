@@ -14,6 +14,7 @@ from app.store.tables.equipment import (
 from app.store.tables.measurement import Measurement, MeasuringSession, Record
 from app.store.tables.people import Account, Login, SignInLink, Token
 from app.store.tables.results import Calibration, CalibrationParameter, IdempotentReply, Job
+from app.store.tables.station import StationCommand, StationEvent, StationRun
 
 __all__ = [
     "Account",
@@ -33,6 +34,9 @@ __all__ = [
     "Stand",
     "StandCertificate",
     "Start",
+    "StationCommand",
+    "StationEvent",
+    "StationRun",
     "Token",
     "TypeLimit",
     "TypeNominal",

@@ -22,6 +22,10 @@ OPERATIONS = [result.ok() for result in SCHEMA.get_all_operations()]
 CHECKS = [
     not_a_server_error, status_code_conformance, content_type_conformance, response_schema_conformance,
 ]  # fmt: skip
+REPORT = {
+    "station": "S1-PC", "run": "a", "sequence": 1, "sent_at": "2026-03-01T09:30:00Z", "phase": "finished",
+    "cells": [{"theta_deg": 0, "psi_deg": 0, "state": "recorded"}],
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -31,6 +35,7 @@ def filled(service: Service) -> Service:
     session_id = opened(client)
     client.put(f"/sessions/{session_id}/positions/0/0/means", json={"jx_ma": 0.1, "jy_ma": 0.2})
     client.post(f"/sessions/{session_id}/calibrations", json={})
+    client.put(f"/sessions/{session_id}/station", json=REPORT)
     return service
 
 
