@@ -14,7 +14,8 @@ steps, so a step from rest begins with every state zero, and ω̇ never appears:
     ẏ = (K·(z + q/T1) − y)/T2        ẇ = (y − w)/T2      y  after the first lag
 
 A loop without integrator (T1 infinite) has no q, one without lags (T2 = 0) neither y nor w.
-The states' exact propagator over a time τ is exp(F·τ): nothing is integrated in small steps.
+Nothing is integrated in small steps: over a time τ the states move by exp(F·τ)
+(`simdevice.responses` holds the regular time axes), and at any single time by the modes, here.
 """
 
 from dataclasses import dataclass, fields
@@ -32,6 +33,8 @@ _DECAYED = 40.0
 # Above this condition number of its eigenvectors the state matrix is nearly defective: the modes
 # lose that factor of 2e-16 in precision, and the matrix exponential is taken instead.
 _DEFECTIVE = 1e6
+# Of the largest pole: what its eigenvalue's rounding may move another one by, with room.
+_ROUNDING = 1e-13
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,20 +145,33 @@ class LoopDynamics:
         return rows
 
     @cached_property
+    def inputs(self) -> ComplexArray:
+        """(n, 2): columns by which the case rate and the drift, rad/s, drive the states."""
+        columns = np.zeros((len(self.matrix), 2), dtype=np.complex128)
+        columns[0, 0], columns[1, 1] = -1.0, -1j * self.parameters.nutation
+        return columns
+
+    @cached_property
     def poles(self) -> ComplexArray:
         """(n,), rad/s, the slowest to decay first."""
         return self._modes[0]
 
     @property
     def stable(self) -> bool:
-        """Whether everything decays."""
-        return bool(self.poles.real.max() < 0)
+        """Whether everything decays; a pole within rounding of the imaginary axis does not."""
+        return bool(self.poles[0].real < -_ROUNDING * np.abs(self.poles).max())
+
+    def refuse_unstable(self) -> None:
+        """Raise `ValueError` when the loop never settles."""
+        if not self.stable:
+            raise ValueError(
+                f"The loop is unstable, its pole at {self.poles[0]:.4g} rad/s does not decay: "
+                "the measured rates never settle. Choose other loop parameters."
+            )
 
     def steady_state(self, rate: complex = 0.0, drift: complex = 0.0) -> ComplexArray:
         """States, (n,), that a steady case rate and drift, rad/s, lead to."""
-        held = np.zeros(len(self.matrix), dtype=np.complex128)
-        held[0], held[1] = -rate, -1j * self.parameters.nutation * drift
-        return np.asarray(np.linalg.solve(self.matrix, -held))
+        return -np.asarray(np.linalg.solve(self.matrix, self.inputs @ np.array([rate, drift])))
 
     def measured_rates_after_step(
         self,
@@ -187,8 +203,7 @@ class LoopDynamics:
         ValueError
             When the loop is unstable: it has no steady values.
         """
-        if not self.stable:
-            raise ValueError(f"The loop never settles: {self.verdict}")
+        self.refuse_unstable()
         rate, drift = complex(rate_step_x, rate_step_y), complex(drift_step_x, drift_step_y)
         start = -self.steady_state(rate, drift)
         t = np.asarray(t, dtype=np.float64)
@@ -199,23 +214,18 @@ class LoopDynamics:
 
     def free_motion(self, start: ComplexArray, t: Array) -> ComplexArray:
         """Outputs z and −W·z, (2, len(t)), with the inputs zero and the states `start` at t = 0."""
-        poles, vectors, inverse = self._modes
         if self._defective:
-            return np.asarray((self.output @ expm(t[:, None, None] * self.matrix) @ start).T)
-        weights = self.output @ vectors * (inverse @ start)
+            return np.asarray(self.output @ (expm(t[:, None, None] * self.matrix) @ start).T)
         out = np.zeros((2, len(t)), dtype=np.complex128)
-        for pole, weight in zip(poles, weights.T, strict=True):
+        for pole, weight in zip(self.poles, self.mode_weights(start).T, strict=True):
             alive = pole.real * t > -_DECAYED
             out[:, alive] += np.multiply.outer(weight, np.exp(pole * t[alive]))
         return out
 
-    @property
-    def verdict(self) -> str:
-        """Whether the loop is stable, in a sentence."""
-        worst = self.poles[0]
-        if self.stable:
-            return f"stable, its slowest pole at {worst:.4g} rad/s decays in {-1 / worst.real:.3g} s."
-        return f"its pole at {worst:.4g} rad/s does not decay."
+    def mode_weights(self, start: ComplexArray) -> ComplexArray:
+        """How much of each mode is in z and in −W·z, (2, n), when the states are `start`."""
+        _, vectors, inverse = self._modes
+        return self.output @ vectors * (inverse @ start)
 
     @cached_property
     def _modes(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
