@@ -1,6 +1,7 @@
 """The stand by its bytes, as a manual would print them: what is sent, seconds waited, what is answered."""
 
 import pytest
+
 from tests.simdevice.instruments import Bench, told
 
 # A turn of 180° at 30 °/s and 1 s of locking take 7 s; seeking the reference at rest takes 10 s.
