@@ -70,11 +70,19 @@ class Channel:
         (n,) array
             A.
         """
-        analogue = self.gain * current + self.offset + self.noise * deviates
+        return self.shown(self.gain * current + self.offset + self.noise * deviates)
+
+    def shown(self, analogue: Array) -> Array:
+        """Readings of what arrives at the converter, A: quantised, and no further than the limit."""
         if not self.step:
             return np.clip(analogue, -self.limit, self.limit)
         codes = np.clip(np.rint(analogue / self.step), -self._last_code, self._last_code)
         return codes * self.step + 0.0  # no reading is −0.0
+
+    @property
+    def top(self) -> float:
+        """The largest reading, A; a reading there says that the current may be larger."""
+        return self._last_code * self.step if self.step else self.limit
 
     def analogue(self, current: float, current_std: float) -> tuple[float, float]:
         """Mean and standard deviation, A, before quantisation and limit; see `moments`."""

@@ -1,67 +1,71 @@
-"""A session on the bench: the records of both currents in every position, or their means alone.
+"""A session on the bench: the records of both currents in every position.
 
-A record is steady current + white rate noise through the torquers, read by the ammeter. Each
-position's record depends on the bench and the position alone, so records may be made in any order
-and by any number of workers.
+The current of a channel is a sum of parts, each with its own parameters and its own stream:
+
+- the steady current in the place (`Gyro`, `Stand`), of the gyro as it is in this start;
+- white rate noise, as the loop passes it on;
+- bias instability and rate random walk (`slow`), warm-up and temperature (`thermal`), all of them
+  functions of the time since power-up, which the timetable says for every record;
+- what is left of the transient after the move (`closed_loop`);
+- mains and ripple (`interference`).
+
+The ammeter reads the sum at the moments of its clock, and faults befall what it read. A record
+depends on the bench, the position and its repeat alone, so records may be made in any order and by
+any number of workers, and the first m of n samples are those of m. A part that is off is neither
+drawn nor computed, and a part switched on changes no number of another's.
 """
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simdevice.ammeter import Ammeter
+from simdevice import currents, faults
+from simdevice.arrangement import Bench, refuse_twins
 from simdevice.certificate import Certificate, Position
+from simdevice.currents import steady_currents
+from simdevice.faults import Kind
 from simdevice.gyro import Gyro
-from simdevice.noise import RateNoise
+from simdevice.means import MeanCurrents, mean_currents
 from simdevice.stand import Stand
-from simdevice.streams import Part, stream
+from simdevice.streams import Part
 
 Array = NDArray[np.float64]
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Bench:
-    """Everything that a session's currents depend on.
-
-    Attributes
-    ----------
-    gyro, stand, ammeter, noise
-        The true gyro (as it is in this start), the true stand, the instrument, the rate noise.
-    rate
-        Samples per second.
-    duration
-        Of each record, s.
-    seed
-        Of the session's noise.
-    """
-
-    gyro: Gyro
-    stand: Stand
-    ammeter: Ammeter = field(default_factory=Ammeter)
-    noise: RateNoise = field(default_factory=RateNoise)
-    rate: float = 200.0
-    duration: float = 60.0
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        if not (0 < self.rate < np.inf and 0 < self.duration < np.inf):
-            raise ValueError("The sampling rate and the duration must be finite and greater than zero.")
-        if self.samples < 1:
-            raise ValueError("The record is shorter than one sample: raise the duration or the rate.")
-
-    @property
-    def samples(self) -> int:
-        """Number of samples of a record."""
-        return round(self.duration * self.rate)
+__all__ = [
+    "Bench",
+    "MeanCurrents",
+    "SimulatedPosition",
+    "SimulatedSession",
+    "mean_currents",
+    "position_record",
+    "run_session",
+    "steady_currents",
+]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedPosition:
-    """The record of one position: time from its beginning, s, and both currents as read, A; all (n,)."""
+    """The record of one position.
+
+    Attributes
+    ----------
+    theta, psi, repeat
+        What was asked for, rad.
+    t, jx, jy : (n,) arrays
+        Time from the record's beginning, s, and both currents as read, A.
+    begin
+        s after power-up.
+    temperature
+        Mean of the gyro's temperature over the record, K; None where it is not known.
+    overload
+        Whether a reading is at the ammeter's limit.
+    faults
+        What befell it; an interrupted record is one that ends early.
+    """
 
     theta: float
     psi: float
@@ -69,6 +73,10 @@ class SimulatedPosition:
     t: Array
     jx: Array
     jy: Array
+    begin: float = 0.0
+    temperature: float | None = None
+    overload: bool = False
+    faults: tuple[Kind, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,8 +88,8 @@ class SimulatedSession:
 
     @property
     def truth(self) -> Gyro:
-        """The gyro's true parameters."""
-        return self.bench.gyro
+        """The gyro's true parameters in this start, warm and at the reference temperature."""
+        return self.bench.gyro_in_this_start
 
     @property
     def stand(self) -> Stand:
@@ -94,54 +102,52 @@ class SimulatedSession:
         return self.bench.stand.certificate
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MeanCurrents:
-    """Mean currents of a session without its records; arrays (n,), one row per position.
+def position_record(bench: Bench, position: Position, count: int | None = None) -> SimulatedPosition:
+    """The record of one take of one position.
 
-    `jx`, `jy` and their standard uncertainties `u_jx`, `u_jy` in A; the uncertainty is that of the
-    noise (type A) and 0 for a bench without noise. `duration` in s and `rate` in Hz say which
-    records the means stand for.
-    """
-
-    theta: Array
-    psi: Array
-    repeat: NDArray[np.int64]
-    jx: Array
-    jy: Array
-    u_jx: Array
-    u_jy: Array
-    duration: float
-    rate: float
-
-
-def steady_currents(bench: Bench, positions: Sequence[Position]) -> tuple[Array, Array]:
-    """True steady currents in each position, A, (n,) each: no noise, no instrument."""
-    return bench.gyro.steady_currents(*bench.stand.felt(positions))
-
-
-def position_record(bench: Bench, position: Position) -> SimulatedPosition:
-    """The record of one position.
+    Parameters
+    ----------
+    bench, position
+        All that the record depends on; the take is the position's repeat.
+    count
+        Samples, default: those of the bench's duration. The timetable's slots keep their length, so
+        the first samples do not depend on how many are asked for.
 
     Raises
     ------
     ValueError
         When the stand's certificate does not cover the position.
     """
-    n = bench.samples
-
-    def normal(part: Part, number: int) -> Array:
-        return stream(bench.seed, part, number, *position.key).standard_normal(n)
-
-    sample_std = bench.noise.sample_std(bench.rate)
-    noise = bench.gyro.currents_for(
-        sample_std * normal(Part.RATE_WHITE, 0), sample_std * normal(Part.RATE_WHITE, 1)
-    )
-    steady = steady_currents(bench, [position])
+    n = bench.samples if count is None else count
+    t = np.arange(n) / bench.rate
+    kinds = bench.kinds_at(position) if bench.faults else ()
+    stands_at = faults.wrong(position) if Kind.WRONG_POSITION in kinds else position
+    current = np.repeat(np.array(steady_currents(bench, [stands_at])), n, axis=1)
+    for part in (
+        currents.white_currents(bench, position, n),
+        currents.moving_currents(
+            bench, position, stands_at, bench.interference.instants(t, bench.seed, position)
+        ),
+    ):
+        if part is not None:
+            current += part
     jx, jy = (
-        channel.read(steady[number] + noise[number], normal(Part.AMMETER_WHITE, number))
+        channel.read(current[number], currents.normal(bench, Part.AMMETER_WHITE, number, position, n))
+        if channel.noise
+        else channel.read(current[number], np.zeros(n))
         for number, channel in enumerate(bench.ammeter.channels)
     )
-    return SimulatedPosition(position.theta, position.psi, position.repeat, np.arange(n) / bench.rate, jx, jy)
+    if kinds:
+        samples = np.array([t, jx, jy])
+        t, jx, jy = faults.afflicted(samples, kinds, position, bench.seed, bench.samples, bench.ammeter)
+    begin = bench.begin(position)
+    known = bench.temperature
+    return SimulatedPosition(
+        position.theta, position.psi, position.repeat, t, jx, jy, begin,
+        None if known is None else float(known.at(begin + np.arange(n) / bench.rate).mean()),
+        any(_overloaded(j, channel.top) for j, channel in zip((jx, jy), bench.ammeter.channels, strict=True)),
+        kinds,
+    )  # fmt: skip
 
 
 def run_session(bench: Bench, positions: Sequence[Position], *, workers: int = 1) -> SimulatedSession:
@@ -162,7 +168,7 @@ def run_session(bench: Bench, positions: Sequence[Position], *, workers: int = 1
     ValueError
         When a position and repeat is named twice, or the certificate does not cover a position.
     """
-    _refuse_twins(positions)
+    refuse_twins(positions)
     if workers < 1:
         raise ValueError(f"There are {workers} workers: give at least one.")
     record = partial(position_record, bench)
@@ -172,68 +178,5 @@ def run_session(bench: Bench, positions: Sequence[Position], *, workers: int = 1
         return SimulatedSession(bench, tuple(pool.map(record, positions)))
 
 
-def mean_currents(bench: Bench, positions: Sequence[Position]) -> MeanCurrents:
-    """Means that records of this bench would have, drawn directly.
-
-    A mean of n readings is normal with the expectation of one reading and its standard deviation
-    over √n: the noise is white. Expectation and deviation include quantisation and limit
-    (`simdevice.ammeter.Channel.moments`). The numbers are not those of `run_session`: the same
-    distribution, from streams of their own.
-
-    Parameters
-    ----------
-    bench, positions
-        As for `run_session`.
-
-    Raises
-    ------
-    ValueError
-        As `run_session`.
-    """
-    _refuse_twins(positions)
-    currents = steady_currents(bench, positions)
-    sample_std = bench.noise.sample_std(bench.rate)
-    deviates = _rate_and_ammeter_deviates(bench.seed, positions)
-    noise = bench.gyro.currents_for(sample_std * deviates[:, 0], sample_std * deviates[:, 1])
-    per_rate = bench.gyro.currents_for(np.array([1.0, 0.0]), np.array([0.0, 1.0]))
-    means, uncertainties = np.empty((2, len(positions))), np.empty((2, len(positions)))
-    for number, channel in enumerate(bench.ammeter.channels):
-        current_std = sample_std * float(np.hypot(*per_rate[number]))
-        _, analogue_std = channel.analogue(0.0, current_std)
-        for row, current in enumerate(currents[number]):
-            expectation, std = channel.moments(float(current), current_std)
-            error = channel.gain * noise[number][row] + channel.noise * deviates[row, 2 + number]
-            # The reading's own deviation, in proportion to the analogue noise: this keeps the
-            # correlation that cross-coupling makes between the channels.
-            shrink = std / analogue_std if analogue_std else 0.0
-            means[number, row] = expectation + error * shrink / np.sqrt(bench.samples)
-            uncertainties[number, row] = std / np.sqrt(bench.samples)
-    return MeanCurrents(
-        theta=np.array([position.theta for position in positions]),
-        psi=np.array([position.psi for position in positions]),
-        repeat=np.array([position.repeat for position in positions], dtype=np.int64),
-        jx=means[0],
-        jy=means[1],
-        u_jx=uncertainties[0],
-        u_jy=uncertainties[1],
-        duration=bench.samples / bench.rate,
-        rate=bench.rate,
-    )
-
-
-def _rate_and_ammeter_deviates(seed: int, positions: Sequence[Position]) -> Array:
-    """Standard normal numbers (n, 4): rate noise x, y, ammeter noise x, y."""
-    parts = [(part, axis) for part in (Part.MEAN_RATE_WHITE, Part.MEAN_AMMETER_WHITE) for axis in range(2)]
-    return np.array(
-        [
-            [stream(seed, part, axis, *position.key).standard_normal() for part, axis in parts]
-            for position in positions
-        ]
-    )
-
-
-def _refuse_twins(positions: Sequence[Position]) -> None:
-    if not positions:
-        raise ValueError("A session needs at least one position.")
-    if len({position.key for position in positions}) < len(positions):
-        raise ValueError("A position is named twice: give its further measurements the repeats 1, 2, …")
+def _overloaded(readings: Array, top: float) -> bool:
+    return bool(np.abs(readings).max(initial=0.0) >= top)

@@ -39,6 +39,24 @@ class Part(IntEnum):
     """The seed of one session in a gyro's history (number of the session)."""
     FLEET_SEED = 12
     """The seed of one gyro in a fleet (number of the gyro)."""
+    FLICKER = 13
+    """Bias instability (axis, number of the process, number of the start)."""
+    RATE_RANDOM_WALK = 14
+    """Rate random walk (axis, number of the start)."""
+    TURN_ON = 15
+    """Turn-on offset of both biases (number of the start)."""
+    JITTER = 16
+    """The sampling clock's jitter in a record (position, repeat)."""
+    MAINS_PHASE = 17
+    """Phase of the mains at a record's beginning (position, repeat)."""
+    RIPPLE_PHASE = 18
+    """Phase of the rotor at a record's beginning (position, repeat)."""
+    FAULT = 19
+    """Where in a record a fault strikes (kind, position, repeat)."""
+    FAULT_PLACE = 20
+    """The place that a fault without one strikes (kind, which of this kind)."""
+    RATE_WHITE_BEFORE = 21
+    """White rate noise just before a record, backwards: what the loop still answers (axis, position, repeat)."""
 
 
 def _sequence(seed: int, part: Part, key: tuple[int, ...]) -> np.random.SeedSequence:
