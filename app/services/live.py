@@ -6,7 +6,7 @@ be sent again and may overtake each other. Events are kept once, by their number
 handed out with every answer until the station says what became of it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any, Final, cast
 
@@ -23,7 +23,6 @@ from app.services.live_views import (
     Phase,
     Reading,
     Report,
-    RunBrief,
     RunEvent,
     RunView,
     Sentence,
@@ -98,12 +97,6 @@ def state_mark(work: Work, session_id: int) -> station.Mark:
     if found is None:
         raise _unheard(work, session_id)
     return found
-
-
-def briefs(work: Work, session_ids: Sequence[int]) -> Mapping[int, RunBrief]:
-    """The present run of each session that has one."""
-    found = station.briefs(work.db, session_ids)
-    return {key: RunBrief(cast(Phase, row.phase), *row[1:]) for key, row in found.items()}
 
 
 def command(

@@ -23,6 +23,9 @@ ENDED: Final = ("finished", "stopped", "failed")
 SILENT_AFTER: Final = timedelta(seconds=5)
 """A station reports about once a second; after so long without a word something is wrong."""
 
+FORGOTTEN_AFTER: Final = timedelta(hours=1)
+"""A run that neither ended nor was heard of for so long asks for nobody's attention any more."""
+
 
 class Spot(NamedTuple):
     """Where a run is: a position, which measurement of it, and the how-manieth attempt at that."""
@@ -136,11 +139,22 @@ class RunBrief:
     settled: bool | None
     left_s: float | None
     received_at: datetime
+    now: datetime
 
     @property
     def ended(self) -> bool:
         """Whether nothing more will come."""
         return self.phase in ENDED
+
+    @property
+    def silent(self) -> bool:
+        """Whether a report should have come long ago."""
+        return not self.ended and self.now - self.received_at > SILENT_AFTER
+
+    @property
+    def under_way(self) -> bool:
+        """Whether somebody should look: it has not ended, and was heard of not so long ago."""
+        return not self.ended and self.now - self.received_at < FORGOTTEN_AFTER
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,10 @@ class StandNow:
 
 @dataclass(frozen=True, slots=True)
 class Overview:
-    """`current` is the open session to go on with; `recent` the latest sessions, open ones first."""
+    """`current` is the session at a stand now; `recent` the latest sessions, open ones first.
+
+    A session that a station measures comes before the newest open one.
+    """
 
     current: SessionDetail | None
     recent: tuple[SessionView, ...]
@@ -34,7 +37,10 @@ def overview(work: Work, limit: int = 12) -> Overview:
     latest = sessions.sessions(work, limit=limit).items
     known = {item.id for item in unsolved}
     recent = (*unsolved, *(item for item in latest if item.id not in known))[:limit]
-    waiting = [item for item in unsolved if item.state in ("measuring", "ready")]
+    waiting = [
+        *(item for item in unsolved if item.station and item.station.under_way),
+        *(item for item in unsolved if item.state in ("measuring", "ready")),
+    ]
     return Overview(sessions.detail(work, waiting[0].id) if waiting else None, recent)
 
 

@@ -3,12 +3,13 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
+from typing import Any, cast
 
 from app.errors import Invalid, NotFound, problem
 from app.services import gyros, stands, verdicts
 from app.services.job_views import job_view
 from app.services.lab import Work
+from app.services.live_views import Phase, RunBrief
 from app.services.views import (
     MeasurementView,
     Page,
@@ -17,7 +18,7 @@ from app.services.views import (
     SessionState,
     SessionView,
 )
-from app.store import equipment, measurement, results
+from app.store import equipment, measurement, results, station
 from app.store.tables import Calibration, Gyro, Job, Measurement, MeasuringSession, StandCertificate, Start
 
 
@@ -144,11 +145,19 @@ def views(work: Work, rows: Sequence[MeasuringSession]) -> tuple[SessionView, ..
     ids = [row.id for row in rows]
     counts = measurement.measured_positions(work.db, ids)
     jobs, newest = results.jobs_of(work.db, ids), results.last_calibrations(work.db, ids)
-    return tuple(_view(row, counts, jobs.get(row.id), newest.get(row.id)) for row in rows)
+    runs = {
+        key: RunBrief(cast(Phase, run.phase), *run[1:], now=work.now)
+        for key, run in station.briefs(work.db, ids).items()
+    }
+    return tuple(_view(row, counts, jobs.get(row.id), newest.get(row.id), runs.get(row.id)) for row in rows)
 
 
 def _view(
-    row: MeasuringSession, counts: Mapping[int, int], job: Job | None, newest: Calibration | None
+    row: MeasuringSession,
+    counts: Mapping[int, int],
+    job: Job | None,
+    newest: Calibration | None,
+    run: RunBrief | None,
 ) -> SessionView:
     measured, total = counts.get(row.id, 0), len(row.certificate.positions)
     return SessionView(
@@ -157,7 +166,7 @@ def _view(
         started_at=row.started_at, created_by=row.created_by, temperature_c=row.temperature_c,
         note=row.note, latitude_deg=row.latitude_deg, positions_measured=measured, positions_total=total,
         state=_state(job, newest, measured, total), job=job_view(job) if job else None,
-        result=verdicts.summary(newest) if newest else None,
+        result=verdicts.summary(newest) if newest else None, station=run,
     )  # fmt: skip
 
 

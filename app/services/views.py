@@ -6,6 +6,7 @@ from datetime import date, datetime
 from typing import Any, Generic, Literal, NamedTuple, TypeVar
 
 from app.exchange.rows import CertificateRow
+from app.services.live_views import RunBrief
 
 T = TypeVar("T")
 
@@ -234,6 +235,7 @@ class SessionView:
     state: SessionState
     job: JobView | None
     result: ResultSummary | None
+    station: RunBrief | None
 
 
 @dataclass(frozen=True, slots=True)
