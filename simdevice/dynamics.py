@@ -215,7 +215,7 @@ class LoopDynamics:
     def free_motion(self, start: ComplexArray, t: Array) -> ComplexArray:
         """Outputs z and −W·z, (2, len(t)), with the inputs zero and the states `start` at t = 0."""
         if self._defective:
-            return np.asarray(self.output @ (expm(t[:, None, None] * self.matrix) @ start).T)
+            return np.asarray(self.output @ (exponential(self.matrix, t) @ start).T)
         out = np.zeros((2, len(t)), dtype=np.complex128)
         for pole, weight in zip(self.poles, self.mode_weights(start).T, strict=True):
             alive = pole.real * t > -_DECAYED
@@ -240,3 +240,10 @@ class LoopDynamics:
     def _defective(self) -> bool:
         balanced, _ = matrix_balance(self.matrix, permute=False, separate=True)
         return bool(np.linalg.cond(np.linalg.eig(balanced)[1]) > _DEFECTIVE)
+
+
+def exponential(matrix: ComplexArray, t: ArrayLike) -> ComplexArray:
+    """exp(matrix·t), (..., n, n) for t of shape (...); balanced first, as the states' sizes differ by 1e6."""
+    balanced, (scale, _) = matrix_balance(matrix, permute=False, separate=True)
+    times = np.asarray(t, dtype=np.float64)[..., None, None]
+    return np.asarray(scale[:, None] * expm(times * balanced) / scale)

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
-from simdevice.dynamics import LoopDynamics
+from simdevice.dynamics import LoopDynamics, exponential
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -84,7 +83,7 @@ def step_response(
     n = 1 + int((duration if cut_off is None else cut_off) / interval * (1 + 1e-12))
     t = np.arange(n, dtype=np.float64) * interval
     steady = dynamics.steady_state(complex(*rate), complex(*drift))
-    states = free_states(expm(dynamics.matrix * interval), -steady, n)
+    states = free_states(exponential(dynamics.matrix, interval), -steady, n)
     # From rest: the steady state and what is not yet there of it.
     z, measured = dynamics.output @ states + (dynamics.output @ steady)[:, None]
     return StepResponse(t, z.real, z.imag, measured.real, measured.imag, cut_off)
@@ -149,8 +148,8 @@ def discretised(dynamics: LoopDynamics, interval: float) -> tuple[ComplexArray, 
     """Φ, (n, n), and Γ, (n, 2), of one interval in which case rate and drift are held."""
     n = len(dynamics.matrix)
     whole = np.zeros((n + 2, n + 2), dtype=np.complex128)
-    whole[:n, :n], whole[:n, n:] = dynamics.matrix * interval, dynamics.inputs * interval
-    together = expm(whole)
+    whole[:n, :n], whole[:n, n:] = dynamics.matrix, dynamics.inputs
+    together = exponential(whole, interval)
     return together[:n, :n], together[:n, n:]
 
 
