@@ -14,21 +14,22 @@
 
 A block's rows are four little-endian float64: index, time since the beginning in s, Jx, Jy. Rows may
 be fetched while the acquisition runs, and more than once; beyond what is there the block is empty.
-Settings have queries. STATus:OPERation: 16 acquiring. STATus:QUEStionable: 2 overload in the last
-acquisition or reading.
+Settings have queries. INITiate is refused while the stand moves or stands between its positions; a
+movement during an acquisition shows as an overload to its end.
+
+STATus:OPERation: 16 acquiring. STATus:QUEStionable: 2 overload in the last acquisition or reading.
 """
 
 from collections.abc import Sequence
 from typing import Final
 
-from simdevice.axes import NotAllowed
 from simdevice.laboratory import Laboratory
 from simdevice.scpi.errors import ScpiError
-from simdevice.scpi.instrument import block
+from simdevice.scpi.instrument import HangUp, block
 from simdevice.scpi.tree import Command, Real, Whole
 
 _ACQUIRING, _OVERLOAD = 16, 2
-_MOST_SAMPLES: Final = 10_000_000
+_MOST_SAMPLES: Final = 1_000_000
 _LARGEST_LABEL: Final = 2**53
 
 
@@ -38,7 +39,7 @@ class AmmeterDevice:
     def __init__(self, laboratory: Laboratory, identity: str) -> None:
         self._laboratory = laboratory
         self.identity = identity
-        self._over = False
+        self._last_reading_over = False
         self._take_defaults()
 
     @property
@@ -60,7 +61,7 @@ class AmmeterDevice:
         acquisition, clock = self._laboratory.acquisition, self._laboratory.clock
         if acquisition is None or not acquisition.running(now := clock.now()):
             return 0.0
-        return clock.wall_seconds(acquisition.begin + acquisition.duration - now)
+        return clock.wall_seconds(acquisition.end - now)
 
     def operation(self) -> int:
         """See the module."""
@@ -68,17 +69,18 @@ class AmmeterDevice:
 
     def questionable(self) -> int:
         """See the module."""
-        return _OVERLOAD * (self._over or self._overload())
+        return _OVERLOAD * (self._last_reading_over or self._overload())
 
     def reset(self) -> None:
         """Forget the acquisition; settings as at power-on."""
         self._laboratory.acquisition = None
-        self._over = False
+        self._last_reading_over = False
         self._take_defaults()
 
     def abort(self) -> None:
-        """End the acquisition."""
-        self._laboratory.stop_acquiring()
+        """End the acquisition; what there is stays."""
+        if self._laboratory.acquisition is not None:
+            self._laboratory.acquisition.stop(self._laboratory.clock.now())
 
     def _take_defaults(self) -> None:
         bench = self._laboratory.bench
@@ -95,7 +97,7 @@ class AmmeterDevice:
 
     def _read(self) -> str:
         currents = self._laboratory.currents()
-        self._over = self._laboratory.over_limit(currents)
+        self._last_reading_over = self._laboratory.at_limit(currents)
         return ",".join(f"{current:.9E}" for current in currents)
 
     def _initiate(self) -> None:
@@ -103,7 +105,7 @@ class AmmeterDevice:
             raise ScpiError(-213, "an acquisition runs: ABORt it first")
         try:
             self._laboratory.acquire(self._label, self._take, self._count, self._rate)
-        except NotAllowed as error:
+        except ValueError as error:
             raise ScpiError(-221, str(error)) from None
 
     def _state(self) -> str:
@@ -111,17 +113,18 @@ class AmmeterDevice:
         if acquisition is None:
             return "IDLE,0,0,0"
         state = "RUN" if acquisition.running(now) else "DONE"
-        return f"{state},{acquisition.label},{acquisition.available(now)},{int(self._overload())}"
+        return f"{state},{acquisition.label},{acquisition.available(now)},{acquisition.overloaded(now):d}"
 
     def _overload(self) -> bool:
         acquisition = self._laboratory.acquisition
-        if acquisition is None:
-            return False
-        return bool(acquisition.over[: acquisition.available(self._laboratory.clock.now())].any())
+        return acquisition is not None and acquisition.overloaded(self._laboratory.clock.now())
 
     def _fetch(self, first: int, most: int) -> bytes:
         acquisition = self._laboratory.acquisition
         if acquisition is None:
             raise ScpiError(-230, "nothing was acquired: INITiate first")
         last = min(first + most, acquisition.available(self._laboratory.clock.now()))
-        return block(acquisition.rows[first:last].astype("<f8").tobytes())
+        answer = block(acquisition.rows[first:last].astype("<f8").tobytes())
+        if first < last and self._laboratory.connection_breaks():
+            raise HangUp(answer[: len(answer) // 2])
+        return answer

@@ -1,7 +1,7 @@
 """The two axes of a stand with fixed positions, as they move: where the case is, and what the encoders say.
 
 Both axes turn at `SLEW_RATE` at the same time and then lock into the index. Movement is a function of
-laboratory time: nothing runs between two questions.
+laboratory time: nothing runs between two questions. Angles in rad, times in s of that clock.
 """
 
 from dataclasses import dataclass
@@ -11,20 +11,24 @@ import numpy as np
 
 from simdevice.certificate import Certificate, Position
 from simdevice.clock import Clock
+from simdevice.faults import WRONG_BY, Kind
 from solver.units import deg_from_rad, rad_from_deg
 
 SLEW_RATE: Final = rad_from_deg(30.0)
 """rad/s."""
 LOCKING: Final = 1.0
-"""Time of a movement beyond its turning, s."""
+"""Time of a movement besides its turning, s."""
 SEEKING: Final = 10.0
-"""Time to seek the reference, beyond turning to it, s."""
+"""Time to seek the reference besides turning to it, s."""
 LIMIT: Final = rad_from_deg(360.0)
 """Largest angle of either axis and sign, rad."""
 TOLERANCE: Final = rad_from_deg(0.01)
 """How far a commanded angle may be from a fixed position, rad; the index takes it there."""
 BUTTON_HELD: Final = 10.0
-"""How long the emergency stop stays pressed when a fault pressed it, s."""
+"""How long a fault keeps the button of the emergency stop pressed, s."""
+
+_HALFWAY: Final = (Kind.STALL, Kind.EMERGENCY_STOP)
+"""What befalls a movement in its middle; the rest at its end."""
 
 Angles = tuple[float, float]
 
@@ -43,25 +47,28 @@ class NoSuchPosition(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class _Movement:
-    """From where to where, s of laboratory time; `mishap` is the kind of fault that befalls it, or empty."""
+    """From where to where, and when; `seeks` tells one that seeks the reference."""
 
     start: Angles
     target: Angles
     begin: float
     end: float
-    seeks_reference: bool
-    mishap: str = ""
+    seeks: bool
+    mishap: Kind | None
+
+    @property
+    def middle(self) -> float:
+        return (self.begin + self.end) / 2
 
     def at(self, now: float) -> Angles:
-        part = min(max((now - self.begin) / (self.end - self.begin), 0.0), 1.0)
-        if self.mishap in ("stall", "emergency-stop"):
-            part = min(part, 0.5)
+        latest = self.middle if self.mishap in _HALFWAY else self.end
+        part = (min(now, latest) - self.begin) / (self.end - self.begin)
         (theta, psi), (to_theta, to_psi) = self.start, self.target
         return theta + part * (to_theta - theta), psi + part * (to_psi - psi)
 
 
 class Axes:
-    """State of the axes. Angles in rad, times in s of the laboratory's clock."""
+    """State of the axes, from the power-on of their controller: at 0, 0 and without reference."""
 
     def __init__(self, certificate: Certificate, clock: Clock) -> None:
         self._places = [
@@ -71,15 +78,15 @@ class Axes:
         self._clock = clock
         self._movement: _Movement | None = None
         self._rest: Angles = (0.0, 0.0)
+        self._at_rest_since = -np.inf
         self._slip = 0.0
         self._referenced = False
         self._stopped = False
         self._held_until = -np.inf
-        self.movements = 0
-        self.last_end = -np.inf
-        """When the last movement ended."""
+        self.came_from: Angles | None = None
+        """Where the case was when the last movement began; None before the first."""
 
-    def nearest(self, theta: float, psi: float) -> Position:
+    def fixed_position(self, theta: float, psi: float) -> Position:
         """The fixed position at these angles.
 
         Raises
@@ -105,9 +112,19 @@ class Axes:
         return self._movement is not None
 
     @property
+    def turning(self) -> bool:
+        """Whether the case really turns."""
+        self._advance()
+        movement = self._movement
+        return movement is not None and not (
+            movement.mishap is Kind.STALL and self._clock.now() >= movement.middle
+        )
+
+    @property
     def seeking(self) -> bool:
-        """Whether that movement seeks the reference."""
-        return self.moving and self._movement is not None and self._movement.seeks_reference
+        """Whether a movement seeks the reference."""
+        self._advance()
+        return self._movement is not None and self._movement.seeks
 
     @property
     def stopped(self) -> bool:
@@ -116,9 +133,17 @@ class Axes:
         return self._stopped
 
     @property
-    def held(self) -> bool:
-        """Whether the button of the emergency stop is pressed still."""
-        return self.stopped and self._clock.now() < self._held_until
+    def slipped(self) -> bool:
+        """Whether the case is not where the encoders say."""
+        self._advance()
+        return self._slip != 0.0
+
+    @property
+    def at_rest_since(self) -> float:
+        """When the last movement ended; −∞ before the first."""
+        self._advance()
+        movement = self._movement
+        return self._at_rest_since if movement is None else movement.middle  # stalled there
 
     def encoders(self) -> Angles:
         """What the encoders say."""
@@ -136,31 +161,39 @@ class Axes:
         movement = self._movement
         if movement is None:
             return 0.0
-        return np.inf if movement.mishap == "stall" else max(movement.end - self._clock.now(), 0.0)
+        return np.inf if movement.mishap is Kind.STALL else movement.end - self._clock.now()
 
     def home(self) -> None:
-        """Begin to seek the reference, at 0, 0."""
-        self._begin((0.0, 0.0), SEEKING, seeks_reference=True)
+        """Begin to seek the reference, at 0, 0; a movement that goes on is given up for it.
 
-    def move(self, theta: float, psi: float, mishap: str = "") -> None:
-        """Begin to move to a fixed position; one that goes on is given up for it.
+        Raises
+        ------
+        EmergencyStopped
+            While the emergency stop is engaged.
+        """
+        self._begin((0.0, 0.0), SEEKING, seeks=True)
+
+    def move(self, theta: float, psi: float, mishap: Kind | None = None) -> None:
+        """Begin to move; a movement that goes on is given up for it.
 
         Raises
         ------
         NotAllowed
-            Without a reference, or after an emergency stop.
+            Without a reference, or while the emergency stop is engaged.
         """
         if not self.referenced and not self.stopped:
-            raise NotAllowed("the axes have no reference: seek it first, AXIS:HOME")
+            raise NotAllowed("the axes have no reference: seek it with AXIS:HOME")
         self._begin((theta, psi), LOCKING, mishap=mishap)
 
     def stop(self) -> None:
         """Stop at once, wherever that is."""
-        self._halt()
+        self._rest = self.encoders()
+        if self._movement is not None:
+            self._movement, self._at_rest_since = None, self._clock.now()
 
     def press(self) -> None:
         """Press the button of the emergency stop; it stays pressed until `release`."""
-        self._halt()
+        self.stop()
         self._stopped, self._held_until = True, np.inf
 
     def release(self) -> None:
@@ -175,42 +208,35 @@ class Axes:
         NotAllowed
             While the button is pressed.
         """
-        if self.held:
-            raise NotAllowed("the button is still pressed: release it first")
+        if self.stopped and self._clock.now() < self._held_until:
+            raise NotAllowed("the button of the emergency stop is still pressed")
         self._stopped = False
 
     def _begin(
-        self, target: Angles, extra: float, *, seeks_reference: bool = False, mishap: str = ""
+        self, target: Angles, extra: float, *, seeks: bool = False, mishap: Kind | None = None
     ) -> None:
         if self.stopped:
             raise EmergencyStopped
-        start = self.case() if seeks_reference else self.encoders()
-        now = self._clock.now()
+        start, now = self.encoders(), self._clock.now()
         turn = max(abs(to - at) for at, to in zip(start, target, strict=True))
-        self._movement = _Movement(
-            start, target, now, now + turn / SLEW_RATE + extra, seeks_reference, mishap
-        )
-        self._slip = 0.0
-        self._referenced = self._referenced and not seeks_reference
-        self.movements += 1
+        self.came_from, self._slip = self.case(), 0.0
+        self._movement = _Movement(start, target, now, now + turn / SLEW_RATE + extra, seeks, mishap)
+        self._referenced = self._referenced and not seeks
 
     def _advance(self) -> None:
         """Take the end of a movement into account, if it has come."""
         movement, now = self._movement, self._clock.now()
-        if movement is None or movement.mishap == "stall":
+        if movement is None or movement.mishap is Kind.STALL:
             return
-        if movement.mishap == "emergency-stop" and now >= (middle := (movement.begin + movement.end) / 2):
-            self._rest, self._movement, self.last_end = movement.at(middle), None, middle
-            self._stopped, self._held_until = True, middle + BUTTON_HELD
-        elif now >= movement.end:
-            self._rest, self._movement, self.last_end = movement.target, None, movement.end
-            self._referenced = movement.mishap != "lost-reference"
-            self._slip = np.pi / 2 if movement.mishap == "wrong-position" else 0.0
-
-    def _halt(self) -> None:
-        self._rest = self.encoders()
-        if self._movement is not None:
-            self._movement, self.last_end = None, self._clock.now()
+        ended = movement.middle if movement.mishap is Kind.EMERGENCY_STOP else movement.end
+        if now < ended:
+            return
+        self._rest, self._movement, self._at_rest_since = movement.at(ended), None, ended
+        if movement.mishap is Kind.EMERGENCY_STOP:
+            self._stopped, self._held_until = True, ended + BUTTON_HELD
+            return
+        self._referenced = movement.mishap is not Kind.LOST_REFERENCE
+        self._slip = WRONG_BY if movement.mishap is Kind.WRONG_POSITION else 0.0
 
 
 def _apart(one: float, other: float) -> float:

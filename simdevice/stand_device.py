@@ -13,6 +13,9 @@
 ``ABORt``                stop at once
 ======================== ======================================================================
 
+A stand that was just switched on stands at 0, 0 and must seek its reference. A fault that presses the
+emergency stop keeps its button pressed for 10 s.
+
 STATus:OPERation: 256 moving, 512 seeking the reference. STATus:QUEStionable: 512 no reference,
 1024 emergency stop.
 """

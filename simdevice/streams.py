@@ -57,6 +57,8 @@ class Part(IntEnum):
     """The place that a fault without one strikes (kind, which of this kind)."""
     RATE_WHITE_BEFORE = 21
     """White rate noise just before a record, backwards: what the loop still answers (axis, position, repeat)."""
+    LIVE_READING = 22
+    """White noise of a reading outside a record (number of the start, tenths of a second since power-up)."""
 
 
 def _sequence(seed: int, part: Part, key: tuple[int, ...]) -> np.random.SeedSequence:

@@ -15,6 +15,7 @@ from app.errors import Invalid, problem
 from simdevice.ammeter_device import AmmeterDevice
 from simdevice.bench import Bench
 from simdevice.clock import Clock
+from simdevice.faults import Kind, parse
 from simdevice.laboratory import Laboratory
 from simdevice.scenarios import SCENARIOS
 from simdevice.scpi.instrument import Instrument
@@ -61,10 +62,15 @@ def serve(
         str | None,
         typer.Option("--powered-on", help="Moment of the gyro's power-on, ISO 8601; default: now."),
     ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option("--fault", help=f"KIND[@THETA/PSI][!], ! for every take. Kinds: {', '.join(Kind)}."),
+    ] = None,
 ) -> None:
     """Serve a simulated stand and ammeter as SCPI instruments until Ctrl-C."""
+    clock = Clock(_moment(powered_on), speed)
     bench = _bench(scenario, seed, latitude, rate, duration)
-    laboratory = Laboratory(bench, Clock(_moment(powered_on), speed))
+    laboratory = _laboratory(bench, clock, fault or ())
     devices = [
         device(laboratory, f"Driftbook,{model},{seed},{version('driftbook')}")
         for device, model in ((StandDevice, "SIM-STAND"), (AmmeterDevice, "SIM-AMMETER"))
@@ -97,6 +103,13 @@ def _bench(name: str, seed: int, latitude: float | None, rate: float, duration: 
     if latitude is None:
         return bench
     return replace(bench, stand=replace(bench.stand, latitude=rad_from_deg(latitude)))
+
+
+def _laboratory(bench: Bench, clock: Clock, faults: Sequence[str]) -> Laboratory:
+    try:
+        return Laboratory(bench, clock, [parse(text) for text in faults])
+    except ValueError as error:
+        raise Invalid(problem("bad-fault", "%(why)s", column="--fault", why=str(error))) from None
 
 
 def _moment(text: str | None) -> float:

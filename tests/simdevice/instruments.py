@@ -2,8 +2,11 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from simdevice.ammeter_device import AmmeterDevice
 from simdevice.clock import Clock
+from simdevice.faults import parse
 from simdevice.laboratory import Laboratory
 from simdevice.scenarios import scenario
 from simdevice.scpi.instrument import Instrument
@@ -41,7 +44,7 @@ class Bench:
         self.hands = Hands()
         self.bench = replace(scenario(name).bench(seed), **changes)
         clock = Clock(0.0, wall=self.hands.read, steady=self.hands.read)
-        self.laboratory = Laboratory(self.bench, clock, faults)
+        self.laboratory = Laboratory(self.bench, clock, [parse(text) for text in faults])
         self.stand = Instrument(StandDevice(self.laboratory, "Driftbook,SIM-STAND,7,1.0"))
         self.ammeter = Instrument(AmmeterDevice(self.laboratory, "Driftbook,SIM-AMMETER,7,1.0"))
 
@@ -55,3 +58,19 @@ class Bench:
             self.wait(60)
         told(self.stand, f"AXIS:POS {theta_deg},{psi_deg}")
         self.wait(60)
+
+    def acquired(self, count: int, take: int = 0) -> np.ndarray:
+        """Acquire where the stand is, and fetch all there is."""
+        assert told(self.ammeter, f"ACQ:COUN {count};TAKE {take};:INIT;:SYST:ERR?") == '0,"No error"'
+        self.wait(count / self.bench.rate)
+        return rows(told_raw(self.ammeter, f"FETC:BLOC? 0,{count}"))
+
+
+def rows(answer: bytes) -> np.ndarray:
+    """Rows of a definite-length block with its line feed: (n, 4)."""
+    digits = int(answer[1:2])
+    length = int(answer[2 : 2 + digits])
+    contents = answer[2 + digits :]
+    assert answer[:1] == b"#"
+    assert contents[length:] == b"\n"
+    return np.frombuffer(contents[:length], "<f8").reshape(-1, 4)
