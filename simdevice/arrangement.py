@@ -99,6 +99,8 @@ class Bench:
 
     def kinds_at(self, position: Position) -> tuple[Kind, ...]:
         """What befalls this take of this place."""
+        if not self.faults:
+            return ()
         return tuple(fault.kind for fault in self.located_faults if fault.hits(position))
 
     def slot(self, position: Position) -> int:

@@ -32,6 +32,7 @@ from simdevice.gyro import Gyro
 from simdevice.means import MeanCurrents, mean_currents
 from simdevice.stand import Stand
 from simdevice.streams import Part
+from simdevice.truth import mean_gyro
 
 Array = NDArray[np.float64]
 
@@ -41,6 +42,7 @@ __all__ = [
     "SimulatedPosition",
     "SimulatedSession",
     "mean_currents",
+    "mean_gyro",
     "position_record",
     "run_session",
     "steady_currents",
@@ -88,8 +90,8 @@ class SimulatedSession:
 
     @property
     def truth(self) -> Gyro:
-        """The gyro's true parameters in this start, warm and at the reference temperature."""
-        return self.bench.gyro_in_this_start
+        """The gyro's true parameters, as they were on average while the records were made."""
+        return mean_gyro(self.bench, [Position(item.theta, item.psi, item.repeat) for item in self.positions])
 
     @property
     def stand(self) -> Stand:
@@ -120,31 +122,24 @@ def position_record(bench: Bench, position: Position, count: int | None = None) 
     """
     n = bench.samples if count is None else count
     t = np.arange(n) / bench.rate
-    kinds = bench.kinds_at(position) if bench.faults else ()
-    stands_at = faults.wrong(position) if Kind.WRONG_POSITION in kinds else position
-    current = np.repeat(np.array(steady_currents(bench, [stands_at])), n, axis=1)
+    begin = bench.begin(position)
+    kinds = bench.kinds_at(position)
+    case = currents.case_in(bench, faults.wrong(position) if Kind.WRONG_POSITION in kinds else position)
+    current = np.repeat(case.steady()[:, None], n, axis=1)
+    instants = bench.interference.instants(t, bench.seed, position)
     for part in (
         currents.white_currents(bench, position, n),
-        currents.moving_currents(
-            bench, position, stands_at, bench.interference.instants(t, bench.seed, position)
-        ),
+        currents.moving_currents(case, position, begin, instants),
     ):
         if part is not None:
             current += part
-    jx, jy = (
-        channel.read(current[number], currents.normal(bench, Part.AMMETER_WHITE, number, position, n))
-        if channel.noise
-        else channel.read(current[number], np.zeros(n))
-        for number, channel in enumerate(bench.ammeter.channels)
-    )
+    jx, jy = (_read(bench, position, number, current[number]) for number in range(2))
     if kinds:
         samples = np.array([t, jx, jy])
         t, jx, jy = faults.afflicted(samples, kinds, position, bench.seed, bench.samples, bench.ammeter)
-    begin = bench.begin(position)
-    known = bench.temperature
     return SimulatedPosition(
         position.theta, position.psi, position.repeat, t, jx, jy, begin,
-        None if known is None else float(known.at(begin + np.arange(n) / bench.rate).mean()),
+        _mean_temperature(bench, begin),
         any(_overloaded(j, channel.top) for j, channel in zip((jx, jy), bench.ammeter.channels, strict=True)),
         kinds,
     )  # fmt: skip
@@ -176,6 +171,21 @@ def run_session(bench: Bench, positions: Sequence[Position], *, workers: int = 1
         return SimulatedSession(bench, tuple(map(record, positions)))
     with ThreadPoolExecutor(workers) as pool:
         return SimulatedSession(bench, tuple(pool.map(record, positions)))
+
+
+def _read(bench: Bench, position: Position, number: int, current: Array) -> Array:
+    """What a channel of the ammeter shows, A."""
+    channel, n = bench.ammeter.channels[number], len(current)
+    if not channel.noise:
+        return channel.read(current, np.zeros(n))
+    return channel.read(current, currents.normal(bench, Part.AMMETER_WHITE, number, position, n))
+
+
+def _mean_temperature(bench: Bench, begin: float) -> float | None:
+    """Mean of the gyro's temperature over a record, K; a hundred moments are enough for one so slow."""
+    if bench.temperature is None:
+        return None
+    return float(bench.temperature.at(begin + np.linspace(0.0, bench.duration, 100)).mean())
 
 
 def _overloaded(readings: Array, top: float) -> bool:

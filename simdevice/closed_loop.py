@@ -9,8 +9,10 @@ from simdevice.dynamics import LoopDynamics, LoopParameters
 
 Array = NDArray[np.float64]
 
-_REMEMBERED = 1e-12
-"""How much of a disturbance the loop may still remember when it is taken to be forgotten."""
+_REMEMBERED = 1e-6
+"""Of a pulse of noise, what the loop still remembers when it is left out."""
+_GONE = 1e-18
+"""Of a transient, what is nothing beside the current that it is added to."""
 
 
 @lru_cache(maxsize=8)
@@ -49,6 +51,11 @@ def transient(
     )  # fmt: skip
 
 
+def forgotten(parameters: LoopParameters, t: float) -> bool:
+    """Whether nothing is left of a transient `t` seconds after the move."""
+    return bool(dynamics_of(parameters).poles.real.max() * t < np.log(_GONE))
+
+
 @lru_cache(maxsize=8)
 def answer(parameters: LoopParameters, rate: float) -> NDArray[np.complex128]:
     """Measured rate after a drift noise that lasts one sample, sample by sample.
@@ -57,7 +64,7 @@ def answer(parameters: LoopParameters, rate: float) -> NDArray[np.complex128]:
     -------
     (m,) array
         Real part: on the axis of the noise; imaginary part: what it makes on y of noise on x. It ends
-        where 1e-12 of it is left, and its sum is 1: slow noise passes as it is.
+        where 1e-6 of it is left, and its sum is 1: slow noise passes as it is.
 
     Raises
     ------

@@ -1,6 +1,7 @@
 """The parts of a session's currents, each by itself; `simdevice.bench` says what they are."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,9 +9,93 @@ from numpy.typing import NDArray
 from simdevice import closed_loop, slow
 from simdevice.arrangement import Bench
 from simdevice.certificate import Position
+from simdevice.gyro import Gyro
 from simdevice.streams import Part, stream
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Case:
+    """The gyro at rest in one place, as `case_in` makes it.
+
+    Attributes
+    ----------
+    bench
+        All that does not depend on the place.
+    gyro
+        As it is in this start.
+    rate, force : (3,) arrays
+        What the case feels along its axes: rad/s and g.
+    """
+
+    bench: Bench
+    gyro: Gyro
+    rate: Array
+    force: Array
+
+    def steady(self) -> Array:
+        """Steady currents, (2,), A: warm, and at the reference temperature."""
+        return np.array(self.gyro.steady_currents(self.rate, self.force))
+
+    def slow(self, t: Array) -> Array | None:
+        """What differs from the steady currents and changes slowly: wander, warm-up, temperature.
+
+        Parameters
+        ----------
+        t : (n,) array
+            Since power-up, s, not negative.
+
+        Returns
+        -------
+        (2, n) array, or None
+            A; None when there is no such part.
+        """
+        bench, parts = self.bench, list[Array]()
+        if bench.noise.wanders:
+            rates = slow.wander(bench.noise, bench.seed, bench.start, t)
+            parts.append(np.array(self.gyro.currents_for(rates[0], rates[1])))
+        if not bench.warm_up.quiet:
+            drifts = bench.warm_up.drifts(t)
+            # More drift is less current: it turns the rotor in the torquers' stead.
+            parts.append(np.array(self.gyro.currents_for(-drifts[0], -drifts[1])))
+        if bench.temperature is not None and bench.temperature.sensitivity:
+            parts.append(bench.temperature.currents(self.gyro, self.rate, self.force, t))
+        return total(parts)
+
+    def transient(self, previous: "Case", t: Array) -> Array | None:
+        """What is left of the transient of a move from the previous place.
+
+        Parameters
+        ----------
+        previous
+            Where the case was.
+        t : (n,) array
+            Since the case came to rest here, s.
+
+        Returns
+        -------
+        (2, n) array, or None
+            A; None without a loop.
+        """
+        if self.bench.loop is None:
+            return None
+        rate_step = self.rate[:2] - previous.rate[:2]
+        drift_step = np.array(self.gyro.drift(self.force)) - np.array(self.gyro.drift(previous.force))
+        x, y = closed_loop.transient(self.bench.loop, rate_step, drift_step, t)
+        return np.array(self.gyro.currents_for(x, y))
+
+
+def case_in(bench: Bench, position: Position) -> Case:
+    """The gyro at rest in a place; the position's repeat does not matter.
+
+    Raises
+    ------
+    ValueError
+        When the stand's certificate does not cover the place.
+    """
+    (rate,), (force,) = bench.stand.felt([position])
+    return Case(bench, bench.gyro_in_this_start, rate, force)
 
 
 def steady_currents(bench: Bench, positions: Sequence[Position]) -> tuple[Array, Array]:
@@ -21,83 +106,62 @@ def steady_currents(bench: Bench, positions: Sequence[Position]) -> tuple[Array,
     return bench.gyro_in_this_start.steady_currents(*bench.stand.felt(positions))
 
 
-def slow_currents(bench: Bench, position: Position, t: Array) -> Array | None:
-    """What differs from the steady current and changes slowly: wander, warm-up, temperature.
+def white_currents(bench: Bench, position: Position, n: int) -> Array | None:
+    """White rate noise through loop and torquers, (2, n), A; None without it."""
+    std = bench.noise.sample_std(bench.rate)
+    if not std:
+        return None
+    x, y = (std * normal(bench, Part.RATE_WHITE, axis, position, n) for axis in range(2))
+    if bench.loop is not None:
+        pulse = closed_loop.answer(bench.loop, bench.rate)
+        before = (
+            std * normal(bench, Part.RATE_WHITE_BEFORE, axis, position, len(pulse) - 1)[::-1]
+            for axis in range(2)
+        )
+        x, y = (np.concatenate(pair) for pair in zip(before, (x, y), strict=True))
+        # Summed sample by sample, not by a Fourier transform, whose rounding would depend on n.
+        passed = np.convolve(x + 1j * y, pulse, "valid")
+        x, y = passed.real, passed.imag
+    return np.array(bench.gyro.currents_for(x, y))
+
+
+def moving_currents(case: Case, position: Position, begin: float, t: Array) -> Array | None:
+    """All of a record that is a function of time.
 
     Parameters
     ----------
-    bench, position
-        Where the case stands; its repeat does not matter.
+    case
+        Where the gyro really is.
+    position
+        What was asked for: its streams, and its place in the timetable.
+    begin
+        Of the record, s after power-up.
     t : (n,) array
-        Since power-up, s.
+        When samples are really taken, s after `begin`.
 
     Returns
     -------
     (2, n) array, or None
         A; None when there is no such part.
     """
-    gyro = bench.gyro_in_this_start
-    parts: list[Array] = []
-    if bench.noise.wanders:
-        parts.append(np.array(gyro.currents_for(*slow.wander(bench.noise, bench.seed, bench.start, t))))
-    if not bench.warm_up.quiet:
-        # More drift is less current: it turns the rotor in the torquers' stead.
-        parts.append(np.array(gyro.currents_for(*-bench.warm_up.drifts(t))))
-    if bench.temperature is not None and bench.temperature.sensitivity:
-        (rate,), (force,) = bench.stand.felt([position])
-        parts.append(bench.temperature.currents(gyro, rate, force, t))
-    return _total(parts)
-
-
-def transient_currents(bench: Bench, previous: Position, position: Position, t: Array) -> Array:
-    """What is left of the transient of a move, (2, n), A, at times `t` since the case came to rest, s."""
-    if bench.loop is None:
-        return np.zeros((2, len(t)))
-    gyro = bench.gyro_in_this_start
-    rate, force = bench.stand.felt([previous, position])
-    drift = np.column_stack(gyro.drift(force))
-    deviation = closed_loop.transient(bench.loop, rate[1, :2] - rate[0, :2], drift[1] - drift[0], t)
-    return np.array(gyro.currents_for(*deviation))
-
-
-def white_currents(bench: Bench, position: Position, n: int) -> Array | None:
-    """White rate noise through loop and torquers, (2, n), A."""
-    std = bench.noise.sample_std(bench.rate)
-    if not std:
-        return None
-    rates = [std * normal(bench, Part.RATE_WHITE, axis, position, n) for axis in range(2)]
-    if bench.loop is not None:
-        pulse = closed_loop.answer(bench.loop, bench.rate)
-        before = [
-            std * normal(bench, Part.RATE_WHITE_BEFORE, axis, position, len(pulse) - 1)[::-1]
-            for axis in range(2)
-        ]
-        x, y = (np.concatenate(pair) for pair in zip(before, rates, strict=True))
-        # Summed sample by sample, not by a Fourier transform, whose rounding would depend on n.
-        passed = np.convolve(x + 1j * y, pulse, "valid")
-        rates = [passed.real, passed.imag]
-    return np.array(bench.gyro_in_this_start.currents_for(rates[0], rates[1]))
-
-
-def moving_currents(bench: Bench, position: Position, stands_at: Position, t: Array) -> Array | None:
-    """All that is a function of time, (2, n), A, at the moments of the samples since the record's begin."""
-    parts: list[Array] = []
-    unsteady = slow_currents(bench, stands_at, np.maximum(bench.begin(position) + t, 0.0))
-    if unsteady is not None:
-        parts.append(unsteady)
-    previous = bench.before(position)
-    if bench.loop is not None and previous is not None:
-        parts.append(transient_currents(bench, previous, stands_at, bench.timetable.settle + t))
+    bench = case.bench
+    parts = [case.slow(np.maximum(begin + t, 0.0))]
+    settle = bench.timetable.settle
+    if bench.loop is not None and not closed_loop.forgotten(bench.loop, settle + float(t.min(initial=0.0))):
+        previous = bench.before(position)
+        if previous is not None:
+            parts.append(case.transient(case_in(bench, previous), settle + t))
     if not bench.interference.quiet:
         parts.append(bench.interference.currents(t, bench.seed, position))
-    return _total(parts)
+    return total([part for part in parts if part is not None])
 
 
-def _total(parts: Sequence[Array]) -> Array | None:
-    total: Array | None = None
+def total(parts: Sequence[Array]) -> Array | None:
+    """Sum of parts in their order; None of none."""
+    result: Array | None = None
     for part in parts:
-        total = part if total is None else total + part
-    return total
+        result = part if result is None else result + part
+    return result
 
 
 def normal(bench: Bench, part: Part, number: int, position: Position, n: int) -> Array:

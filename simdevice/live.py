@@ -8,7 +8,7 @@ import numpy as np
 
 from simdevice.arrangement import Bench
 from simdevice.certificate import Position
-from simdevice.currents import slow_currents, steady_currents, transient_currents
+from simdevice.currents import case_in, total
 
 
 def live_current(
@@ -41,11 +41,11 @@ def live_current(
     jx, jy : float
         True currents, A.
     """
-    currents = np.column_stack(steady_currents(bench, [place]))[0]
-    unsteady = slow_currents(bench, place, np.array([t_since_power_on]))
-    if unsteady is not None:
-        currents = currents + unsteady[:, 0]
+    case = case_in(bench, place)
+    parts = [case.steady()[:, None], case.slow(np.array([t_since_power_on]))]
     if previous_place is not None:
-        currents = currents + transient_currents(bench, previous_place, place, np.array([t_since_move]))[:, 0]
-    jx, jy = currents.tolist()
+        parts.append(case.transient(case_in(bench, previous_place), np.array([t_since_move])))
+    currents = total([part for part in parts if part is not None])
+    assert currents is not None
+    jx, jy = currents[:, 0].tolist()
     return jx, jy

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from simdevice.arrangement import Bench, refuse_twins
 from simdevice.certificate import Position
-from simdevice.currents import slow_currents, steady_currents
+from simdevice.currents import case_in, steady_currents
 from simdevice.streams import Part, stream
 
 Array = NDArray[np.float64]
@@ -119,7 +119,7 @@ def _expected_currents(
     starts = np.cumsum(lengths) - lengths
     expected: list[list[Array]] = [[], []]
     for row, position in enumerate(positions):
-        slow = slow_currents(bench, position, bench.begin(position) + t)
+        slow = case_in(bench, position).slow(bench.begin(position) + t)
         for number in range(2):
             added = np.zeros(1) if slow is None else np.add.reduceat(slow[number], starts) / lengths
             expected[number].append(steady[number][row] + added)

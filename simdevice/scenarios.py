@@ -6,18 +6,23 @@ make.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Final
 
 import numpy as np
 
+from simdevice import dynamics
 from simdevice.ammeter import Ammeter, Channel
 from simdevice.bench import Bench
 from simdevice.certificate import ANGLE_SPREAD, U_RANDOM, U_SYSTEMATIC, Position, draw_certificate
+from simdevice.dynamics import LoopParameters
 from simdevice.gyro import Gyro
+from simdevice.interference import Interference
 from simdevice.noise import RateNoise
 from simdevice.stand import Stand
 from simdevice.streams import Part, derived_seed, stream
+from simdevice.thermal import ROOM, Decay, Temperature, WarmUp
+from simdevice.timetable import Timetable
 from solver.units import rad_from_arcsec, rad_from_deg, rad_per_s_from_deg_per_h
 
 MOSCOW: Final = rad_from_deg(55.7558)
@@ -48,7 +53,15 @@ class GyroType:
     start_scatter
         Standard deviation between starts (power-ups) of one individual, likewise.
     noise
-        Rate noise.
+        Its white rate noise, which is all that most scenarios have.
+    full_noise
+        The same white noise with the type's other coefficients.
+    warm_up
+        What the biases have too much after power-up.
+    sensitivity
+        To temperature, by parameter, SI per K.
+    loop
+        Rebalance loop; None where it is not known.
     """
 
     name: str
@@ -56,6 +69,10 @@ class GyroType:
     spread: Mapping[str, float]
     start_scatter: Mapping[str, float]
     noise: RateNoise
+    full_noise: RateNoise
+    warm_up: WarmUp
+    sensitivity: Mapping[str, float]
+    loop: LoopParameters | None = None
 
 
 GVK_6: Final = GyroType(
@@ -71,6 +88,10 @@ GVK_6: Final = GyroType(
         "kx": 5e-4, "ky": 5e-4, "w0x": _dph(0.03), "w0y": _dph(0.03), "wg": _dph(0.02), "wk": _dph(0.02),
     },
     noise=RateNoise(angle_random_walk=_walk(3e-4)),
+    full_noise=RateNoise(_walk(3e-4), _dph(5e-4), _dph(5e-4) / 60.0, _dph(0.03)),
+    warm_up=WarmUp(Decay(_dph(0.3), 600.0), Decay(_dph(-0.2), 700.0)),
+    sensitivity={"kx": -1e-3, "ky": -1e-3, "w0x": _dph(0.02), "w0y": _dph(-0.015), "wg": _dph(0.01)},
+    loop=dynamics.GVK_6,
 )  # fmt: skip
 
 DTG_4: Final = GyroType(
@@ -86,6 +107,9 @@ DTG_4: Final = GyroType(
         "kx": 4e-4, "ky": 4e-4, "w0x": _dph(0.1), "w0y": _dph(0.1), "wg": _dph(0.06), "wk": _dph(0.06),
     },
     noise=RateNoise(angle_random_walk=_walk(8e-4)),
+    full_noise=RateNoise(_walk(8e-4), _dph(2e-3), _dph(2e-3) / 60.0, _dph(0.1)),
+    warm_up=WarmUp(Decay(_dph(-0.8), 500.0), Decay(_dph(0.6), 500.0)),
+    sensitivity={"kx": -8e-4, "ky": -8e-4, "w0x": _dph(-0.05), "w0y": _dph(0.04), "wg": _dph(-0.03)},
 )  # fmt: skip
 
 TYPES: Final[Mapping[str, GyroType]] = {kind.name: kind for kind in (GVK_6, DTG_4)}
@@ -110,16 +134,21 @@ class Scenario:
         For a command line and its help.
     gyro
         The truth.
+    kind
+        The gyro's type: where coefficients come from that a user asks for beyond the scenario.
     noise, ammeter, latitude, base
         Of the gyro, the instrument and the stand; latitude and base angles in rad.
     angle_spread
         Standard deviation of the certified angles, rad.
     u_random, u_systematic
         The certificate's standard uncertainties, rad; the truth deviates by them.
+    timetable, warm_up, temperature, interference, loop
+        As those of a `Bench`.
     """
 
     name: str
     summary: str
+    kind: GyroType = GVK_6
     gyro: Gyro = GVK_6.nominal
     noise: RateNoise = GVK_6.noise
     ammeter: Ammeter = field(default_factory=lambda: LABORATORY_AMMETER)
@@ -128,6 +157,11 @@ class Scenario:
     angle_spread: float = ANGLE_SPREAD
     u_random: float = U_RANDOM
     u_systematic: float = U_SYSTEMATIC
+    timetable: Timetable = field(default_factory=Timetable)
+    warm_up: WarmUp = field(default_factory=WarmUp)
+    temperature: Temperature | None = None
+    interference: Interference = field(default_factory=Interference)
+    loop: LoopParameters | None = None
 
     def bench(self, seed: int, positions: tuple[Position, ...] | None = None) -> Bench:
         """The bench of this scenario.
@@ -150,12 +184,16 @@ class Scenario:
             u_systematic=self.u_systematic,
         )
         stand = Stand(self.latitude, certificate, self.base, stand_seed)
-        return Bench(self.gyro, stand, self.ammeter, self.noise, seed=seed)
+        return Bench(
+            self.gyro, stand, self.ammeter, self.noise, seed=seed,
+            timetable=self.timetable, warm_up=self.warm_up, temperature=self.temperature,
+            interference=self.interference, loop=self.loop,
+        )  # fmt: skip
 
 
 _ALL = (
     Scenario("gvk-6", "The nominal GVK-6 on a good stand in Moscow."),
-    Scenario("dtg-4", "The nominal DTG-4: coarser, noisier.", gyro=DTG_4.nominal, noise=DTG_4.noise),
+    Scenario("dtg-4", "The nominal DTG-4: coarser, noisier.", kind=DTG_4, gyro=DTG_4.nominal, noise=DTG_4.noise),
     Scenario(
         "quiet",
         "No noise, an ideal ammeter, a perfectly known stand: the parameters come back to rounding.",
@@ -186,6 +224,24 @@ _ALL = (
              ammeter=_alike(Channel(step=1e-9, limit=2e-6, noise=5e-9))),
     Scenario("anisoelastic", "A g²-sensitive drift that the eight parameters do not describe.",
              gyro=GVK_6.nominal.shifted({"wn": _dph(0.3)})),
+    Scenario("full-noise", "Every part of the signal at the GVK-6's coefficients, an hour after power-up.",
+             noise=GVK_6.full_noise, warm_up=GVK_6.warm_up, loop=GVK_6.loop,
+             temperature=Temperature(swing=0.05, period=1800.0, sensitivity=GVK_6.sensitivity),
+             interference=Interference(mains=2e-9, ripple=5e-9, jitter=1e-6),
+             ammeter=Ammeter(Channel(gain=1.00001, offset=1e-10, step=1e-9, limit=1e-3, noise=5e-9),
+                             Channel(gain=0.99999, offset=-1e-10, step=1e-9, limit=1e-3, noise=5e-9))),
+    Scenario("cold-start", "Measured from power-up on: the biases drift as the gyro warms up.",
+             warm_up=GVK_6.warm_up, timetable=Timetable(first=15.0)),
+    Scenario("restless", "Twenty times the bias instability and rate random walk.",
+             noise=replace(GVK_6.full_noise, bias_instability=20 * GVK_6.full_noise.bias_instability,
+                           rate_random_walk=20 * GVK_6.full_noise.rate_random_walk)),
+    Scenario("drifting-temperature", "A room that warms by 2 K in an hour; the gyro follows it.",
+             temperature=Temperature(at_power_up=ROOM - 2.0, drift=2.0 / 3600.0, sensitivity=GVK_6.sensitivity)),
+    Scenario("mains", "The mains, 50 Hz, picked up with 20 nA.", interference=Interference(mains=2e-8)),
+    Scenario("ripple", "Ripple of 50 nA at the rotor's 249.9 Hz: at 200 samples per second it shows at 49.9 Hz.",
+             interference=Interference(ripple=5e-8)),
+    Scenario("jitter", "A sampling clock that jitters by 0.2 ms, over ripple of 50 nA, which shows it.",
+             interference=Interference(ripple=5e-8, jitter=2e-4)),
 )  # fmt: skip
 
 SCENARIOS: Final[Mapping[str, Scenario]] = {scenario.name: scenario for scenario in _ALL}

@@ -18,6 +18,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.blas import dtbsv
 
 from simdevice.noise import RateNoise
 from simdevice.streams import Part, stream
@@ -74,17 +75,21 @@ def wander(noise: RateNoise, seed: int, start: int, t: Array) -> Array:
 @lru_cache(maxsize=16)
 def _flicker(seed: int, axis: int, start: int, count: int) -> Array:
     """Flicker noise of B = 1 at the first `count` knots, stationary from power-up on."""
-    from scipy.signal import lfilter  # here, because it is slow to import and few need it
-
     std = np.sqrt(np.log(RATIO) / np.pi)
     total = np.zeros(count)
     for number, time_constant in enumerate(TIME_CONSTANTS):
-        kept = np.exp(-KNOT / time_constant)
         drive = stream(seed, Part.FLICKER, axis, number, start).standard_normal(count)
         drive[1:] *= np.sqrt(-np.expm1(-2 * KNOT / time_constant))
-        total += std * lfilter([1.0], [1.0, -kept], drive)
+        total += std * _first_order(np.exp(-KNOT / time_constant), drive)
     total.flags.writeable = False
     return total
+
+
+def _first_order(kept: float, drive: Array) -> Array:
+    """Solve x[i] = kept·x[i−1] + drive[i], x[−1] = 0: a triangular system of two diagonals, row by row."""
+    matrix = np.empty((2, len(drive)), order="F")
+    matrix[0], matrix[1] = 1.0, -kept
+    return np.asarray(dtbsv(1, matrix, drive, lower=1, diag=1))
 
 
 @lru_cache(maxsize=16)
