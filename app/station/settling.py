@@ -3,11 +3,13 @@
 A line J = J₀ + b·t is fitted to the readings of a window by least squares. With n readings, S = Σ(t − t̄)² and
 the residuals' scatter s² (n − 2 degrees of freedom), u(b) = s/√S (Draper and Smith, Applied Regression
 Analysis, 1.4). A channel is at rest when |b| + t·u(b) is below the limit, which says more than that no slope
-was seen: so large a one would have been. It drifts when |b| − t·u(b) is above; in between nobody knows yet,
-and more readings are wanted. Warm-up is judged in the same way over a longer window.
+was seen: so large a one would have been. It drifts when |b| − t·u(b) is above; in between nobody knows yet.
+
+The noisier the readings, the longer the window that can tell: u(b) falls with its length to the power 3/2. So the
+last w seconds are judged, then the last 2w, 4w, 8w, and the first window that shows rest is believed. Warm-up is
+judged in the same way with a longer w.
 """
 
-from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
@@ -17,7 +19,8 @@ from scipy.special import stdtrit
 from app.station.contracts import Array
 
 _NA_PER_MA: Final = 1e6
-_FEWEST: Final = 5
+_FEWEST: Final = 10
+_WINDOWS: Final = (1, 2, 4, 8)
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,19 +30,19 @@ class RestRule:
     Attributes
     ----------
     window_s
-        Readings so long back are judged, s.
+        The shortest window, s.
     limit_na_per_s
         Largest slope of a channel at rest, nA/s.
     confidence
-        Probability with which the slope is below the limit (or above it).
+        Probability, of each look, with which the slope is below the limit.
     allowed_s
         After so long without rest somebody has to look, s.
     """
 
     window_s: float
     limit_na_per_s: float
-    confidence: float = 0.95
-    allowed_s: float = 60.0
+    confidence: float = 0.99
+    allowed_s: float = 600.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,14 +67,14 @@ def slope(t_s: Array, current_ma: Array) -> Slope:
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """What the readings of the window say.
+    """What the readings say.
 
     Attributes
     ----------
     settled
         True at rest, False drifting, None not known yet.
     x, y
-        The channels' slopes; None while there are too few readings.
+        The channels' slopes in the window that says so; None while there are too few readings.
     """
 
     settled: bool | None
@@ -84,29 +87,43 @@ class RestWatch:
 
     def __init__(self, rule: RestRule) -> None:
         self._rule = rule
-        self._readings: deque[tuple[float, float, float]] = deque()
-        self._since: float | None = None
+        self._rows = np.empty((64, 3))
+        self._count = 0
+        self._since = 0.0
 
     def clear(self) -> None:
         """Forget all readings: the stand has moved."""
-        self._readings.clear()
-        self._since = None
+        self._count = 0
 
     def add(self, t_s: float, jx_ma: float, jy_ma: float) -> Rest:
-        """Add a reading and judge those of the window."""
-        if self._since is None:
+        """Add a reading and judge."""
+        if not self._count:
             self._since = t_s
-        self._readings.append((t_s, jx_ma, jy_ma))
-        while self._readings[0][0] < t_s - self._rule.window_s:
-            self._readings.popleft()
+        if self._count == len(self._rows):
+            self._make_room(t_s)
+        self._rows[self._count] = t_s, jx_ma, jy_ma
+        self._count += 1
         return self.judged()
 
     def judged(self) -> Rest:
-        """What the readings of the window say; nothing before the window is full."""
-        if self._since is None or len(self._readings) < _FEWEST:
-            return Rest(None)
-        t_s, jx_ma, jy_ma = np.array(self._readings, dtype=np.float64).T
-        if t_s[-1] - self._since < self._rule.window_s or t_s[-1] == t_s[0]:
+        """What the readings say so far; nothing before the shortest window is full."""
+        rows = self._rows[: self._count]
+        verdict = Rest(None)
+        for windows in _WINDOWS:
+            length = windows * self._rule.window_s
+            if not len(rows) or rows[-1, 0] - self._since < length:
+                break
+            first = int(np.searchsorted(rows[:, 0], rows[-1, 0] - length))
+            found = self._window(rows[min(first, max(len(rows) - _FEWEST, 0)) :])
+            if found.settled:
+                return found
+            if verdict.settled is None:
+                verdict = found
+        return verdict
+
+    def _window(self, rows: Array) -> Rest:
+        t_s, jx_ma, jy_ma = rows.T
+        if len(rows) < _FEWEST or t_s[-1] == t_s[0]:
             return Rest(None)
         x, y = slope(t_s, jx_ma), slope(t_s, jy_ma)
         verdicts = [self._settled(x), self._settled(y)]
@@ -120,3 +137,12 @@ class RestWatch:
         if abs(channel.value) + margin <= limit:
             return True
         return False if abs(channel.value) - margin > limit else None
+
+    def _make_room(self, now_s: float) -> None:
+        """Drop what no window reaches any more; double the room when that does not halve it."""
+        oldest = now_s - _WINDOWS[-1] * self._rule.window_s
+        kept = self._rows[np.searchsorted(self._rows[:, 0], oldest) :]
+        room = max(len(self._rows), 2 * len(kept))
+        rows = np.empty((room, 3))
+        rows[: len(kept)] = kept
+        self._rows, self._count = rows, len(kept)
