@@ -1,7 +1,6 @@
 """What the stand's computer runs: bring a session to the server, as often as it takes."""
 
 import hashlib
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,23 +12,11 @@ from rich.progress import track
 
 from app.cli.sessions_on_disk import Item, items
 from app.cli.solve import Method
-from app.errors import AppError, Invalid, problem
+from app.errors import Invalid, problem
 from app.exchange.record_files import write_record_parquet
-from app.exchange.record_places import record_name
 from app.exchange.rows import Facts, MeansRow
 from app.exchange.session_folder import SessionFiles
-
-_ATTEMPTS = 6
-_FIRST_PAUSE_S = 0.5
-_API = "/api/v1"
-
-
-class ServerRefused(AppError):
-    """The server answered, and said no."""
-
-
-class Unreachable(AppError):
-    """The server did not answer in spite of several attempts."""
+from app.station.client import connected, currents_request, followed, send
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,18 +48,14 @@ def upload(
     """Upload a session; safe to repeat: what the server has already is not doubled."""
     for item in items([path]):
         session = item.read()
-        with httpx.Client(base_url=server.rstrip("/") + _API, timeout=60, headers=_bearer(token)) as client:
+        with connected(server, token) as client:
             number = _open_session(client, item, session, gyro, stand, certificate)
             parts = list(_parts(session, number))
             for part in track(parts, description=f"session {number}", transient=True):
-                _send(client, "PUT", part.path, params=part.params, json=part.json, content=part.content)
+                send(client, "PUT", part.path, params=part.params, json=part.json, content=part.content)
             typer.echo(f"{item.name}: session {number}, {len(parts)} positions")
             if method:
                 _solve(client, number, method)
-
-
-def _bearer(token: str) -> dict[str, str]:
-    return {"Authorization": f"Bearer {token}"}
 
 
 def _open_session(
@@ -101,7 +84,7 @@ def _open_session(
                 )
             )
     said = {name: value for name, value in body.items() if value is not None}
-    answer = _send(client, "POST", "/sessions", json=said, headers={"Idempotency-Key": _key(session, said)})
+    answer = send(client, "POST", "/sessions", json=said, headers={"Idempotency-Key": _key(session, said)})
     return int(answer.json()["id"])
 
 
@@ -121,11 +104,9 @@ def _key(session: SessionFiles, said: dict[str, Any]) -> str:
 def _parts(session: SessionFiles, number: int) -> Iterator[_Part]:
     recorded = set()
     for record in session.records:
-        name = record_name(record.theta_deg, record.psi_deg, record.repeat, "parquet")
-        place = f"/sessions/{number}/positions/{record.theta_deg:.15g}/{record.psi_deg:.15g}/currents"
         recorded.add((record.theta_deg, record.psi_deg))
-        params = {"repeat": record.repeat, "filename": name}
-        yield _Part(place, params, content=write_record_parquet(record))
+        path, params = currents_request(number, record.theta_deg, record.psi_deg, record.repeat)
+        yield _Part(path, params, content=write_record_parquet(record))
     for row in session.means:
         if (row.theta_deg, row.psi_deg) not in recorded:
             place = f"/sessions/{number}/positions/{row.theta_deg:.15g}/{row.psi_deg:.15g}/means"
@@ -141,53 +122,6 @@ def _means_body(row: MeansRow) -> dict[str, Any]:
     return {name: value for name, value in body.items() if value is not None}
 
 
-def _send(client: httpx.Client, verb: str, path: str, **what: Any) -> httpx.Response:
-    """Send, again and again while the server is away; every request here may be repeated."""
-    pause_s = _FIRST_PAUSE_S
-    for attempt in range(_ATTEMPTS):
-        try:
-            answer = client.request(
-                verb, path, **{name: value for name, value in what.items() if value is not None}
-            )
-        except httpx.TransportError as error:
-            reason = str(error) or type(error).__name__
-        else:
-            if answer.status_code < 500:
-                return _accepted(answer, client)
-            reason = f"status {answer.status_code}"
-        if attempt < _ATTEMPTS - 1:
-            time.sleep(pause_s)
-            pause_s *= 2
-    raise Unreachable(
-        problem(
-            "unreachable",
-            "%(server)s does not answer (%(reason)s). What was sent is kept there; run the same command again.",
-            server=str(client.base_url),
-            reason=reason,
-        )
-    )
-
-
-def _accepted(answer: httpx.Response, client: httpx.Client) -> httpx.Response:
-    if answer.is_success:
-        return answer
-    try:
-        detail = answer.json()["detail"]
-    except (ValueError, KeyError, TypeError):
-        detail = f"status {answer.status_code}; is there a Driftbook at this address?"
-    raise ServerRefused(
-        problem("refused", "%(server)s says: %(detail)s", server=str(client.base_url), detail=detail)
-    )
-
-
 def _solve(client: httpx.Client, number: int, method: Method) -> None:
-    job = _send(client, "POST", f"/sessions/{number}/calibrations", json={"method": method.value}).json()
-    while job["state"] in ("queued", "running"):
-        time.sleep(0.2)
-        job = _send(client, "GET", f"/jobs/{job['id']}").json()
-    if job["state"] != "succeeded":
-        detail = (job["error"] or {}).get("detail", job["state"])
-        raise ServerRefused(
-            problem("not-solved", "The calibration gave no result: %(detail)s", detail=detail)
-        )
-    typer.echo(f"{client.base_url.copy_with(path=job['result'])}")
+    job = send(client, "POST", f"/sessions/{number}/calibrations", json={"method": method.value}).json()
+    typer.echo(f"{client.base_url.copy_with(path=followed(client, job))}")

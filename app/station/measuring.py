@@ -1,0 +1,265 @@
+"""One target: move there, settle, acquire block by block onto the disk, judge. Every piece can be taken up again."""
+
+import zlib
+from contextlib import closing
+from typing import Final
+
+from app.errors import AppError, problem
+from app.station.blocks import BlockFile
+from app.station.contracts import InstrumentFault, Place, StandStatus
+from app.station.controls import TargetLeft
+from app.station.entries import Abandoned, Acquiring, Finding, Judged, Said, Started, Target, Verdict
+from app.station.history import Attempt
+from app.station.stand import apart_deg
+from app.station.workplace import Workplace
+from solver.errors import Message
+
+_FORGOTTEN: Final = Message(
+    "acquisition-forgotten", "The ammeter does not know the acquisition any more; it is begun anew."
+)
+_FEWEST: Final = 2
+
+
+class TakeFailed(AppError):
+    """What was being measured cannot be measured now; the problem's code names why."""
+
+
+def measure(at: Workplace, target: Target) -> None:
+    """Bring a target's attempt to its end: judged, or abandoned to be begun anew."""
+    attempt = at.history.open_attempt or _begin(at, target)
+    with closing(at.spool.blocks(attempt.number)) as blocks:
+        try:
+            if attempt.acquiring is None:
+                approach(at, attempt)
+                _start(at, attempt)
+            elif not _goes_on(at, attempt, blocks):
+                return
+            if not _collect(at, attempt, blocks):
+                return
+        except TargetLeft:
+            return
+        except (TakeFailed, InstrumentFault) as failed:
+            _fail(at, attempt, failed)
+            return
+        _judge(at, attempt, blocks)
+
+
+def _begin(at: Workplace, target: Target) -> Attempt:
+    number = len(at.history.attempts)
+    at.spool.add(Started(number, target, take=len(at.history.takes(target))))
+    return at.history.attempts[number]
+
+
+def approach(at: Workplace, attempt: Attempt) -> None:
+    """Go there and wait until the currents have settled; a further take goes away first, to index anew."""
+    target, take = attempt.target, attempt.started.take
+    away = _away(at, target) if take else None
+    if away is not None:
+        go(at, away, target, take)
+    go(at, target.place, target, take)
+    settle(at, target, take)
+
+
+def _away(at: Workplace, target: Target) -> Place | None:
+    """The place measured last, other than the target's own."""
+    others = [item.target.place for item in at.history.attempts if item.target.place != target.place]
+    return others[-1] if others else None
+
+
+def go(at: Workplace, place: Place, target: Target | None = None, take: int = 0) -> None:
+    """Move to a place and wait until the encoders confirm it; seek the reference first if there is none.
+
+    Raises
+    ------
+    TakeFailed
+        The stand does not arrive.
+    """
+    if not at.look().homed:
+        home(at)
+    at.live.turn_to("moving", target, take)
+    at.stand.move(place)
+    deadline = at.clock.deadline(at.patience.move_s)
+    while (status := at.look()).moving:
+        if deadline.passed:
+            at.stand.stop()
+            raise TakeFailed(problem("stall", "The stand does not arrive at %(place)s in time; it was stopped.",
+                                     place=shown(place)))  # fmt: skip
+        at.wait()
+    _require_at(at, status, place)
+
+
+def home(at: Workplace) -> None:
+    """Seek the reference.
+
+    Raises
+    ------
+    TakeFailed
+        The stand does not find it.
+    """
+    at.live.turn_to("homing")
+    at.stand.home()
+    deadline = at.clock.deadline(at.patience.home_s)
+    while (status := at.look()).moving:
+        if deadline.passed:
+            at.stand.stop()
+            break
+        at.wait()
+    if not status.homed:
+        raise TakeFailed(
+            problem(
+                "no-reference", "The stand does not find its reference. Look at the stand, then start again."
+            )
+        )
+
+
+def _require_at(at: Workplace, status: StandStatus, place: Place) -> None:
+    if not status.homed:
+        raise TakeFailed(problem("lost-reference", "The stand lost its reference on the way to %(place)s.",
+                                 place=shown(place)))  # fmt: skip
+    if apart_deg(status.place, place) > at.at_place_deg:
+        raise TakeFailed(
+            problem(
+                "stall",
+                "The stand stands at %(stands)s instead of %(place)s: it stalled, or was moved by hand.",
+                stands=shown(status.place),
+                place=shown(place),
+            )
+        )
+
+
+def settle(at: Workplace, target: Target | None = None, take: int = 0) -> None:
+    """Wait until the measured currents keep still.
+
+    Raises
+    ------
+    TakeFailed
+        They do not.
+    """
+    at.live.turn_to("settling", target, take)
+    still = at.judge.settling()
+    deadline = at.clock.deadline(at.patience.settle_s)
+    while True:
+        at.look()
+        currents = at.ammeter.reading()
+        settled = still.add(at.clock.lab_s(), currents)
+        at.live.show(currents=currents, settled=settled)
+        if settled:
+            return
+        if deadline.passed:
+            raise TakeFailed(
+                problem(
+                    "not-settled", "The currents do not settle. Look for vibration, draughts, a loose plug."
+                )
+            )
+        at.wait()
+
+
+def _start(at: Workplace, attempt: Attempt) -> None:
+    begun = at.history.begun
+    assert begun is not None
+    label = 1 << 30 | (zlib.crc32(begun.run.encode()) & 0xFFFFF) << 10 | (attempt.number & 0x3FF)
+    at.spool.add(Acquiring(attempt.number, label, at.clock.now()))
+    at.ammeter.start(label, attempt.started.take, begun.samples, begun.rate_hz)
+
+
+def _goes_on(at: Workplace, attempt: Attempt, blocks: BlockFile) -> bool:
+    """Whether an acquisition begun before a break can be taken up; else it is abandoned."""
+    begun, acquiring = at.history.begun, attempt.acquiring
+    assert begun is not None
+    assert acquiring is not None
+    if blocks.samples >= begun.samples:
+        return True
+    acquired = at.ammeter.status()
+    if acquired.label != acquiring.label:
+        _give_up(
+            at,
+            attempt,
+            Message(
+                "acquisition-forgotten",
+                "The ammeter does not know the acquisition any more; it is begun anew.",
+            ),
+        )
+        return False
+    status = at.look()
+    if status.moving or not status.homed or apart_deg(status.place, attempt.target.place) > at.at_place_deg:
+        _give_up(
+            at,
+            attempt,
+            Message(
+                "stand-was-moved", "The stand was moved while nobody looked on; the record is begun anew."
+            ),
+        )
+        return False
+    return True
+
+
+def _collect(at: Workplace, attempt: Attempt, blocks: BlockFile) -> bool:
+    """Bring all samples onto the disk; False when the acquisition was lost and abandoned.
+
+    An acquisition that ends with fewer samples than it was asked for is whole: the checks tell what it lacks.
+    """
+    begun, acquiring = at.history.begun, attempt.acquiring
+    assert begun is not None
+    assert acquiring is not None
+    at.live.turn_to("acquiring", attempt.target, attempt.started.take)
+    at.live.show(settled=True, fraction=blocks.samples / begun.samples)
+    deadline = at.clock.deadline(at.patience.silence_s)
+    while blocks.samples < begun.samples:
+        acquired = at.ammeter.status()
+        if acquired.label not in (None, acquiring.label) or acquired.samples < blocks.samples:
+            _give_up(at, attempt, _FORGOTTEN)
+            return False
+        _require_at(at, at.look(), attempt.target.place)
+        ready = min(acquired.samples, begun.samples) - blocks.samples
+        if ready >= at.block_samples or (ready and not acquired.running):
+            _fetch(at, blocks, min(ready, at.block_samples))
+            at.live.show(fraction=blocks.samples / begun.samples)
+            deadline = at.clock.deadline(at.patience.silence_s + at.block_samples / begun.rate_hz)
+        elif not acquired.running:
+            break
+        elif deadline.passed:
+            at.ammeter.stop()
+            raise TakeFailed(problem("ammeter-stalled", "The ammeter acquires, and no samples come."))
+        else:
+            at.wait()
+    if blocks.samples < _FEWEST:
+        _give_up(at, attempt, Message("acquisition-empty", "The ammeter acquired nothing; it is begun anew."))
+        return False
+    return True
+
+
+def _fetch(at: Workplace, blocks: BlockFile, most: int) -> None:
+    block = at.ammeter.fetch(blocks.samples, most)
+    if block.first != blocks.samples or not 0 < len(block.t_s) <= most:
+        raise TakeFailed(problem("ammeter-block", "The ammeter gave other samples than those asked for."))
+    blocks.append(block)
+
+
+def _judge(at: Workplace, attempt: Attempt, blocks: BlockFile) -> None:
+    record, digest = at.spool.keep_record(attempt, blocks)
+    findings = tuple(at.judge.findings(record, attempt.target, at.history))
+    jx_ma, jy_ma = float(record.jx_ma.mean()), float(record.jy_ma.mean())
+    at.spool.add(Judged(attempt.number, worst(findings), findings, jx_ma, jy_ma, digest))
+
+
+def _fail(at: Workplace, attempt: Attempt, failed: AppError) -> None:
+    """Keep a take that came to no record as refused, for its reason."""
+    message = failed.problems[0].message
+    at.spool.add(Judged(attempt.number, "refused", (Finding(Said.of(message)),)))
+
+
+def _give_up(at: Workplace, attempt: Attempt, why: Message) -> None:
+    at.spool.add(Abandoned(attempt.number, Said.of(why)))
+
+
+def worst(findings: tuple[Finding, ...]) -> Verdict:
+    """What a take with these findings is worth."""
+    verdicts = {finding.verdict for finding in findings}
+    if "refused" in verdicts:
+        return "refused"
+    return "suspicious" if "suspicious" in verdicts else "accepted"
+
+
+def shown(place: Place) -> str:
+    """A place as people write it."""
+    return f"{place.theta_deg:.6g}/{place.psi_deg:.6g}"

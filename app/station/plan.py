@@ -1,0 +1,79 @@
+"""What comes next: a conclusion from the journal alone, so that a station started again draws the same one."""
+
+from dataclasses import dataclass
+
+from app.station.entries import Target
+from app.station.history import History
+
+
+@dataclass(frozen=True, slots=True)
+class Prepare:
+    """Find out which positions there are."""
+
+
+@dataclass(frozen=True, slots=True)
+class WarmUp:
+    """Wait at the first position until the currents no longer creep."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measure:
+    """Go on with a target's attempt, or begin one."""
+
+    target: Target
+
+
+@dataclass(frozen=True, slots=True)
+class Forward:
+    """Wait until the service has everything."""
+
+
+@dataclass(frozen=True, slots=True)
+class Solve:
+    """Ask the service for the calibration and wait for it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finish:
+    """Nothing is left to do."""
+
+
+Step = Prepare | WarmUp | Measure | Forward | Solve | Finish
+
+
+def next_step(history: History, *, leave_out: bool) -> Step:
+    """Draw the conclusion.
+
+    Parameters
+    ----------
+    history
+        What the journal says.
+    leave_out
+        Whether the calibration shall be asked for without the positions that could not be measured.
+    """
+    if not history.places:
+        return Prepare()
+    if not history.warmed:
+        return WarmUp()
+    attempt = history.open_attempt
+    if attempt is not None:
+        return Measure(attempt.target)
+    for target in history.targets:
+        if history.wanted(target):
+            return Measure(target)
+    if history.session is None or history.to_send():
+        return Forward()
+    if history.result is None and (leave_out or not missing(history)):
+        return Solve()
+    return Finish()
+
+
+def missing(history: History) -> tuple[Target, ...]:
+    """Targets that the calibration lacks against the operator's will, in the cycle's order."""
+    wanted = (target for target in history.targets if target not in history.skipped)
+    return tuple(target for target in wanted if not _is_there(history, target))
+
+
+def _is_there(history: History, target: Target) -> bool:
+    take = history.accepted(target)
+    return take is not None and take.rejected is None

@@ -1,0 +1,94 @@
+"""Which positions the cycle measures: those asked for, the certificate's, or what is remembered of it."""
+
+import json
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from app.station import durable
+from app.station.client import ServerRefused, Unreachable
+from app.station.contracts import Place
+from app.station.entries import Opened, Planned
+from app.station.service import Service
+from app.station.spool import Spool
+from solver.errors import Message
+
+SIXTEEN: Final = tuple(
+    Place(float(theta), float(psi)) for theta in range(0, 360, 90) for psi in range(0, 360, 90)
+)
+"""The method's positions, for a station that never heard of a certificate."""
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """The certificates' positions as this computer heard of them last, by stand."""
+
+    file: Path
+
+    def places(self, stand: str) -> tuple[Place, ...]:
+        """Positions of a stand; empty when nothing is remembered."""
+        return tuple(Place(*place) for place in self._read().get(stand, ()))
+
+    def remember(self, stand: str, places: tuple[Place, ...]) -> None:
+        """Keep a stand's positions."""
+        known = self._read() | {stand: [list(place) for place in places]}
+        durable.make_folders(self.file.parent)
+        durable.write_whole(self.file, json.dumps(known, ensure_ascii=False, indent=1).encode())
+
+    def _read(self) -> dict[str, list[list[float]]]:
+        if not self.file.exists():
+            return {}
+        known: dict[str, list[list[float]]] = json.loads(self.file.read_bytes())
+        return known
+
+
+@dataclass(slots=True)
+class Preparing:
+    """Makes the plan of a new run."""
+
+    spool: Spool
+    service: Callable[[], Service]
+    memory: Memory
+    asked: tuple[Place, ...] | None = None
+
+    def plan(self) -> None:
+        """Write down which positions there are; the session is opened if the service can be reached."""
+        begun = self.spool.history.begun
+        assert begun is not None
+        certified = self._certified()
+        if certified:
+            self.memory.remember(begun.stand, certified)
+        if self.asked:
+            self.spool.add(Planned(self.asked, "option"))
+        elif certified:
+            self.spool.add(Planned(certified, "certificate"))
+        elif remembered := self.memory.places(begun.stand):
+            self.spool.add(Planned(remembered, "remembered"))
+        else:
+            self.spool.add(Planned(SIXTEEN, "sixteen"))
+
+    def _certified(self) -> tuple[Place, ...]:
+        """Positions of the session's certificate; empty when the service is away."""
+        begun = self.spool.history.begun
+        assert begun is not None
+        try:
+            with closing(self.service()) as service:
+                session = service.open_session(begun)
+                with self.spool.lock:
+                    if self.spool.history.session is None:
+                        self.spool.add(Opened(session))
+                return service.certified_places(session)
+        except Unreachable as away:
+            self.spool.note("warning", away.problems[0].message)
+        except ServerRefused as refused:
+            if not self.spool.history.session:
+                raise
+            self.spool.note("warning", refused.problems[0].message)
+        self.spool.note(
+            "warning",
+            Message("certificate-unheard", "The certificate could not be asked for its positions; they are taken "
+                    "as remembered, or as the method's sixteen."),
+        )  # fmt: skip
+        return ()
