@@ -104,6 +104,17 @@ def drift_response(parameters: LoopParameters, omega: ArrayLike) -> ComplexArray
     return np.asarray(-above(omega) / (above(omega) + below(omega)))
 
 
+def phase_crossing(parameters: LoopParameters) -> float:
+    """ω*, rad/s: the only |ω| at which L(iω) is real; infinite without lags, NaN where T1 ≤ 2·T2.
+
+    The rotor's factor 1 − ωA/H is real, so W/(iω) decides: Im((1 + iT1·ω)·(1 − iT2·ω)²) = 0.
+    """
+    t1, t2 = parameters.integral_time, parameters.lag_time
+    if t1 <= 2 * t2:
+        return float("nan")
+    return float(np.sqrt(1 - 2 * t2 / t1) / t2) if t2 else float("inf")
+
+
 def margins(dynamics: LoopDynamics) -> BothSigns | None:
     """Margins and bandwidth of a stable loop; None for an unstable one, which has none."""
     if not dynamics.stable:
@@ -132,11 +143,10 @@ def _at(parameters: LoopParameters, omega: Array) -> Iterable[tuple[complex, flo
 
 
 def _negative_real(parameters: LoopParameters) -> Array:
-    """Where L(iω) is real and negative: Im(W/(iω)) = 0, this side of the nutation."""
-    t1, t2 = parameters.integral_time, parameters.lag_time
-    if t2 == 0 or t1 <= 2 * t2:
+    """Where L(iω) is real and negative: beyond the nutation it has the other sign."""
+    omega = phase_crossing(parameters)
+    if np.isnan(omega):
         return np.empty(0)
-    omega = np.sqrt(1 - 2 * t2 / t1) / t2
     return np.array([omega, -omega] if omega < parameters.nutation else [-omega])
 
 
