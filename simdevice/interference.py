@@ -54,6 +54,11 @@ class Interference:
         """Whether all of it is off."""
         return not (self.mains or self.ripple or self.jitter)
 
+    @property
+    def ripple_frequency(self) -> float:
+        """Hz."""
+        return self.spin / (2 * np.pi)
+
     def instants(self, t: Array, seed: int, position: Position) -> Array:
         """When the samples of nominal times `t`, (n,), s, are really taken."""
         if not self.jitter:

@@ -14,7 +14,8 @@ is n·s² = 4.4·B².
 """
 
 from functools import lru_cache
-from typing import Final
+from threading import Lock
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,30 @@ KNOT: Final = 0.25
 RATIO: Final = 4.0
 TIME_CONSTANTS: Final = tuple(RATIO**number for number in range(10))
 """Of the Gauss–Markov processes that make the flicker noise, s."""
-_FEWEST_KNOTS: Final = 4096
+_BLOCK: Final = 4096
+"""Knots that are drawn together: part of the numbers, never to be changed."""
+_BLOCKS_KEPT: Final = 16
+
+
+class _Process(NamedTuple):
+    """x[i] = kept·x[i−1] + step·w[i] with x[0] = first·w[0] and standard normal w."""
+
+    kept: float
+    step: float
+    first: float
+
+
+def _gauss_markov(time_constant: float) -> _Process:
+    std = float(np.sqrt(np.log(RATIO) / np.pi))
+    step = std * float(np.sqrt(-np.expm1(-2 * KNOT / time_constant)))
+    return _Process(float(np.exp(-KNOT / time_constant)), step, std)
+
+
+_UNITS: Final = {
+    Part.FLICKER: tuple(_gauss_markov(time_constant) for time_constant in TIME_CONSTANTS),
+    Part.RATE_RANDOM_WALK: (_Process(1.0, float(np.sqrt(KNOT)), 0.0),),
+}
+"""What B = 1 and K = 1 are sums of."""
 
 
 def wander(noise: RateNoise, seed: int, start: int, t: Array) -> Array:
@@ -51,38 +75,77 @@ def wander(noise: RateNoise, seed: int, start: int, t: Array) -> Array:
         Of the measured rates x and y, rad/s.
     """
     place = np.asarray(t, dtype=np.float64) / KNOT
-    before = np.floor(place).astype(np.int64)
-    if len(before) and before.min() < 0:
+    if len(place) and not place.min() >= 0:
         raise ValueError("There is no noise before power-up: give times that are not negative.")
+    before = np.floor(place).astype(np.int64)
     beyond = place - before
-    count = _FEWEST_KNOTS
-    while len(before) and before.max() + 2 > count:
-        count *= 2
     rates = np.zeros((2, len(place)))
-    for axis, rate in enumerate(rates):
-        for coefficient, unit in (
-            (noise.bias_instability, _flicker),
-            (noise.rate_random_walk, _walk),
-        ):
-            if coefficient:
-                knots = unit(seed, axis, start, count)
-                rate += coefficient * (knots[before] + beyond * (knots[before + 1] - knots[before]))
+    for part, coefficient in (
+        (Part.FLICKER, noise.bias_instability),
+        (Part.RATE_RANDOM_WALK, noise.rate_random_walk),
+    ):
+        if coefficient:
+            for axis, rate in enumerate(rates):
+                rate += coefficient * _between_knots(_axis(part, seed, axis, start), before, beyond)
     return rates
 
 
-# Remembered because the records of a session ask for the same knots; what is remembered is a pure
-# function of its arguments.
+def _between_knots(axis: "_Axis", before: NDArray[np.int64], beyond: Array) -> Array:
+    values = np.empty(len(before))
+    blocks = before // _BLOCK
+    for block in np.unique(blocks).tolist():
+        here = blocks == block
+        knots, index = axis.knots(block), before[here] - block * _BLOCK
+        values[here] = knots[index] + beyond[here] * (knots[index + 1] - knots[index])
+    return values
+
+
+class _Axis:
+    """One unit noise of one axis from power-up on, in blocks of which each begins where the last ended.
+
+    What is remembered is a pure function of the arguments: the blocks' first values, and the knots
+    of the blocks asked for last, since the records of a session ask for the same ones.
+    """
+
+    def __init__(self, part: Part, seed: int, axis: int, start: int) -> None:
+        self._processes = _UNITS[part]
+        self._key = (seed, part, axis, start)
+        self._lock = Lock()
+        self._firsts: list[tuple[float, ...]] = [()]  # of every block but the very first, which has none
+        self._recent: dict[int, Array] = {}
+
+    def knots(self, block: int) -> Array:
+        """The knots of a block and the first of the next, (_BLOCK + 1,)."""
+        with self._lock:
+            if block not in self._recent:
+                for number in range(min(len(self._firsts) - 1, block), block + 1):
+                    knots = self._drawn(number)
+                self._recent[block] = knots
+                while len(self._recent) > _BLOCKS_KEPT:
+                    del self._recent[next(iter(self._recent))]
+            return self._recent[block]
+
+    def _drawn(self, block: int) -> Array:
+        """A block's knots; notes where the next begins."""
+        seed, part, axis, start = self._key
+        total = np.zeros(_BLOCK + 1)
+        lasts = []
+        for number, process in enumerate(self._processes):
+            drive = stream(seed, part, axis, number, start, block).standard_normal(_BLOCK + 1)
+            # The first number counts in the first block only: later ones go on from their first value.
+            drive[0] = process.first * drive[0] if block == 0 else self._firsts[block][number]
+            drive[1:] *= process.step
+            values = _first_order(process.kept, drive)
+            total += values
+            lasts.append(float(values[-1]))
+        if len(self._firsts) == block + 1:
+            self._firsts.append(tuple(lasts))
+        return total
+
+
 @lru_cache(maxsize=16)
-def _flicker(seed: int, axis: int, start: int, count: int) -> Array:
-    """Flicker noise of B = 1 at the first `count` knots, stationary from power-up on."""
-    std = np.sqrt(np.log(RATIO) / np.pi)
-    total = np.zeros(count)
-    for number, time_constant in enumerate(TIME_CONSTANTS):
-        drive = stream(seed, Part.FLICKER, axis, number, start).standard_normal(count)
-        drive[1:] *= np.sqrt(-np.expm1(-2 * KNOT / time_constant))
-        total += std * _first_order(np.exp(-KNOT / time_constant), drive)
-    total.flags.writeable = False
-    return total
+def _axis(part: Part, seed: int, axis: int, start: int) -> _Axis:
+    return _Axis(part, seed, axis, start)
 
 
 def _first_order(kept: float, drive: Array) -> Array:
@@ -90,13 +153,3 @@ def _first_order(kept: float, drive: Array) -> Array:
     matrix = np.empty((2, len(drive)), order="F")
     matrix[0], matrix[1] = 1.0, -kept
     return np.asarray(dtbsv(1, matrix, drive, lower=1, diag=1))
-
-
-@lru_cache(maxsize=16)
-def _walk(seed: int, axis: int, start: int, count: int) -> Array:
-    """Random walk of K = 1 at the first `count` knots, 0 at power-up."""
-    steps = np.sqrt(KNOT) * stream(seed, Part.RATE_RANDOM_WALK, axis, start).standard_normal(count)
-    steps[0] = 0.0
-    walk = np.cumsum(steps)
-    walk.flags.writeable = False
-    return walk

@@ -40,9 +40,9 @@ class Part(IntEnum):
     FLEET_SEED = 12
     """The seed of one gyro in a fleet (number of the gyro)."""
     FLICKER = 13
-    """Bias instability (axis, number of the process, number of the start)."""
+    """Bias instability (axis, number of the process, number of the start, block of knots)."""
     RATE_RANDOM_WALK = 14
-    """Rate random walk (axis, number of the start)."""
+    """Rate random walk (axis, 0, number of the start, block of knots)."""
     TURN_ON = 15
     """Turn-on offset of both biases (number of the start)."""
     JITTER = 16

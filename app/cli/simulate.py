@@ -7,21 +7,18 @@ from typing import Annotated
 
 import typer
 
+from app.cli import signal_options as signal
 from app.errors import Conflict, Invalid, problem
 from app.exchange.archive import save
-from app.exchange.json_values import dumps
 from app.exchange.numbers import typed
 from app.exchange.rows import Facts
-from app.exchange.session_writing import session_files
-from app.services.simulated import certificate_lab, common_lab, records_lab, truth_values
-from simdevice.bench import Bench, run_session
+from app.services.simulated import celsius
+from app.services.simulated_facts import simulation_facts
+from app.services.simulated_files import simulated_files
+from simdevice.bench import Bench, SimulatedSession, run_session
 from simdevice.certificate import Position, sixteen_positions
-from simdevice.noise import RateNoise
 from simdevice.scenarios import SCENARIOS
-from solver.units import rad_from_deg, rad_per_s_from_deg_per_h
-
-_UNCERTAINTIES = "uncertainties.json"
-"""What the certificate's angles have in common, for `driftbook solve --uncertainties`."""
+from solver.units import rad_from_deg
 
 
 class Format(StrEnum):
@@ -47,30 +44,46 @@ def simulate(
     rate: Annotated[float, typer.Option("--rate", min=1, max=20000, help="Samples per second.")] = 200.0,
     file_format: Annotated[Format, typer.Option("--format", help="Of the record files.")] = Format.CSV,
     scenario: Annotated[str, typer.Option("--scenario", help=_HELP)] = "gvk-6",
-    noise: Annotated[
-        float | None,
-        typer.Option("--noise-deg-per-h", min=0, max=100, help="Noise of a position's mean."),
-    ] = None,
+    repeats: Annotated[
+        int, typer.Option("--repeats", min=1, max=100, help="How often each position is measured.")
+    ] = 1,
+    fault: signal.FaultTexts = None,
+    noise: signal.NoiseOfMean = None,
+    angle_random_walk: signal.AngleRandomWalk = None,
+    bias_instability: signal.BiasInstability = None,
+    rate_random_walk: signal.RateRandomWalk = None,
+    turn_on: signal.TurnOn = None,
+    warm_up: signal.WarmUpText = None,
+    temperature: signal.TemperatureText = None,
+    since_power_up: signal.SincePowerUp = None,
+    mains: signal.Mains = None,
+    ripple: signal.Ripple = None,
+    jitter: signal.Jitter = None,
     gyro: Annotated[str | None, typer.Option("--gyro", help="Serial number for session.json.")] = None,
     stand: Annotated[str | None, typer.Option("--stand", help="Stand for session.json.")] = None,
 ) -> None:
     """Simulate a session: records of currents, certificate, session.json, truth.json."""
     _refuse_full(out)
-    bench = _bench(scenario, seed, _positions(positions), latitude, rate, duration, noise)
-    session = run_session(bench, _positions(positions))
-    facts = Facts(gyro=gyro, stand=stand, latitude_deg=_latitude_deg(latitude, bench))
-    files = session_files(
-        facts,
-        records=records_lab(session.positions),
-        certificate=certificate_lab(bench.stand.certificate),
-        truth=truth_values(bench.gyro),
-        record_format=file_format.value,
+    options = signal.SignalOptions(
+        noise, angle_random_walk, bias_instability, rate_random_walk, turn_on, warm_up, temperature,
+        since_power_up, mains, ripple, jitter, tuple(fault or ()),
+    )  # fmt: skip
+    places = _positions(positions)
+    bench = signal.with_signal(
+        _bench(scenario, seed, places, latitude, rate, duration), SCENARIOS[scenario], options
     )
-    common = {key: value for key, value in common_lab(bench.stand.certificate)._asdict().items() if value}
-    if common:
-        files[_UNCERTAINTIES] = (dumps(common, indent=1) + "\n").encode()
-    save(files, out)
-    typer.echo(f"{len(session.positions)} positions in {out}")
+    session = run_session(bench, [replace(place, repeat=n) for n in range(repeats) for place in places])
+    facts = Facts(
+        gyro=gyro, stand=stand, latitude_deg=_latitude_deg(latitude, bench),
+        temperature_c=_mean_temperature_c(session), further={"simulation": simulation_facts(bench, scenario)},
+    )  # fmt: skip
+    save(simulated_files(session, facts, file_format.value), out)
+    typer.echo(f"{len(session.positions)} records in {out}")
+
+
+def _mean_temperature_c(session: SimulatedSession) -> float | None:
+    known = [item.temperature for item in session.positions if item.temperature is not None]
+    return celsius(sum(known) / len(known)) if known else None
 
 
 def _latitude_deg(latitude: float | None, bench: Bench) -> float:
@@ -78,18 +91,15 @@ def _latitude_deg(latitude: float | None, bench: Bench) -> float:
 
 
 def _bench(
-    name: str, seed: int, places: tuple[Position, ...], latitude: float | None, rate: float,
-    duration: float, noise: float | None,
-) -> Bench:  # fmt: skip
+    name: str, seed: int, places: tuple[Position, ...], latitude: float | None, rate: float, duration: float
+) -> Bench:
     if name not in SCENARIOS:
         raise Invalid(problem("unknown-scenario", "There is no scenario %(name)s. There are: %(names)s.",
                               column="--scenario", name=name, names=", ".join(SCENARIOS)))  # fmt: skip
-    bench = replace(SCENARIOS[name].bench(seed, places), rate=rate, duration=duration)
+    with signal.blaming("--rate"):
+        bench = replace(SCENARIOS[name].bench(seed, places), rate=rate, duration=duration)
     if latitude is not None:
         bench = replace(bench, stand=replace(bench.stand, latitude=rad_from_deg(latitude)))
-    if noise is not None:
-        walk = rad_per_s_from_deg_per_h(noise) * duration**0.5
-        bench = replace(bench, noise=RateNoise(angle_random_walk=walk))
     return bench
 
 

@@ -21,6 +21,7 @@ from simdevice.gyro import Gyro
 from simdevice.noise import RateNoise
 from simdevice.scenarios import GVK_6, LABORATORY_AMMETER, TYPES, draw_gyro
 from simdevice.stand import Stand
+from simdevice.thermal import ZERO_CELSIUS
 from solver.inputs import COMMON
 from solver.records import PARAMETERS
 from solver.units import (
@@ -65,7 +66,7 @@ def simulated_records(
     bench = bench_for(conditions, rows, latitude_deg, statement)
     positions = [Position(rad_from_deg(row.theta_deg), rad_from_deg(row.psi_deg)) for row in rows]
     session = run_session(bench, positions, workers=1)
-    return truth_values(bench.gyro), records_lab(session.positions)
+    return truth_values(session.truth), records_lab(session.positions)
 
 
 def bench_for(
@@ -163,7 +164,7 @@ def records_lab(positions: Sequence[SimulatedPosition]) -> list[CurrentRecord]:
     return [
         CurrentRecord(
             degrees(item.theta), degrees(item.psi), item.t, ma_from_ampere(item.jx), ma_from_ampere(item.jy),
-            item.repeat,
+            item.repeat, temperature_c=celsius(item.temperature),
         )
         for item in positions
     ]  # fmt: skip
@@ -177,6 +178,11 @@ def truth_values(gyro: Gyro) -> dict[str, float]:
 def degrees(angle: float) -> float:
     """A commanded angle in degrees as a person writes it, without what the conversion left."""
     return round(float(deg_from_rad(angle)), 9)
+
+
+def celsius(temperature: float | None) -> float | None:
+    """A temperature, K, in °C to the millikelvin."""
+    return None if temperature is None else round(temperature - ZERO_CELSIUS, 3)
 
 
 def _seed_of(name: str) -> int:
