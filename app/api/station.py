@@ -81,4 +81,4 @@ def _now(caller: Caller, session_id: int) -> StationNow:
 
 def _mark(caller: Caller, session_id: int) -> str:
     with caller.read() as work:
-        return live.state_mark(work, session_id).text
+        return live.state_mark(work, session_id)

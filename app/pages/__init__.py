@@ -1,6 +1,6 @@
 """Pages for people: one module per noun, handlers that parse, call a service and render.
 
-Addresses: ``/`` today · ``/sessions`` ``/sessions/new`` ``/sessions/{id}`` · ``/results``
+Addresses: ``/`` today · ``/sessions`` ``/sessions/new`` ``/sessions/{id}`` ``/sessions/{id}/live`` · ``/results``
 ``/results/{id}`` · ``/measurements/{id}`` · ``/gyros`` ``/gyros/{serial}`` (its history)
 ``/gyros/{serial}/edit`` · ``/types/{name}`` · ``/stands`` ``/stands/{name}``
 ``/stands/{name}/plan`` ``/stands/{name}/uncertainty`` · ``/certificates``
@@ -24,6 +24,7 @@ from app.pages import (
     gyros,
     history,
     jobs,
+    live,
     measurements,
     method,
     planning,
@@ -44,7 +45,7 @@ __all__ = ["errors", "mount", "router"]
 
 router = APIRouter(include_in_schema=False)
 for _noun in (
-    today, sessions, session_files, entry, results, measurements, gyros, history, types, stands, planning,
+    today, sessions, session_files, entry, live, results, measurements, gyros, history, types, stands, planning,
     uncertainty, certificates, simulations, jobs, method, validation, sign_in, choices, assets,
 ):  # fmt: skip
     router.include_router(_noun.router)

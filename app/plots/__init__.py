@@ -12,6 +12,8 @@ from app.plots.allan import AllanPoint, MeanPoint, allan
 from app.plots.autocorrelation import autocorrelation
 from app.plots.convergence import Change, convergence
 from app.plots.drift import DriftEvent, DriftLimit, DriftPoint, drift
+from app.plots.live import LivePoint, live
+from app.plots.live import news as live_news
 from app.plots.pareto import TradeMark, pareto
 from app.plots.record import Stretch, record
 from app.plots.residuals import LIMIT_SD, Place, Residual, decade, residuals
@@ -25,6 +27,7 @@ __all__ = [
     "DriftEvent",
     "DriftLimit",
     "DriftPoint",
+    "LivePoint",
     "MeanPoint",
     "Place",
     "Residual",
@@ -35,6 +38,8 @@ __all__ = [
     "convergence",
     "decade",
     "drift",
+    "live",
+    "live_news",
     "pareto",
     "printed",
     "record",

@@ -7,6 +7,7 @@ from app.plots.allan import template as allan_template
 from app.plots.autocorrelation import template as autocorrelation_template
 from app.plots.convergence import template as convergence_template
 from app.plots.drift import template as drift_template
+from app.plots.live import template as live_template
 from app.plots.pareto import template as pareto_template
 from app.plots.record import template as record_template
 from app.plots.residuals import template as residuals_template
@@ -39,3 +40,4 @@ def make_templates() -> None:
         drift_template(with_dates)
     for channel in ("x", "y"):
         record_template(channel)
+        live_template(channel)

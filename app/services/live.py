@@ -91,12 +91,9 @@ def find(work: Work, session_id: int, events: int = MOST_EVENTS) -> RunView | No
     return None if row is None else _view(work, row, events)
 
 
-def state_mark(work: Work, session_id: int) -> station.Mark:
-    """What tells one state of the session's run from the next; cheap enough to ask for often."""
-    found = station.mark(work.db, session_id)
-    if found is None:
-        raise _unheard(work, session_id)
-    return found
+def state_mark(work: Work, session_id: int) -> str:
+    """What tells one state of the session's run from the next, empty before the first; cheap to ask for."""
+    return "-".join(str(part) for part in station.mark(work.db, session_id) or ())
 
 
 def command(

@@ -50,6 +50,21 @@
     }
   };
 
+  // In a live page an event brings rows and values; the drawing stays, and what is drawn anew begins with them.
+  const renew = (event) => {
+    const chart = charts.get(event.target);
+    if (!chart) return;
+    event.preventDefault();
+    if (!chart.spec) return;
+    const { datasets, params } = JSON.parse(event.detail.data);
+    Object.assign(chart.spec.datasets, datasets);
+    for (const item of chart.spec.params) if (item.name in params) item.value = params[item.name];
+    if (!chart.view) return;
+    for (const [name, rows] of Object.entries(datasets)) chart.view.data(name, rows);
+    for (const [name, value] of Object.entries(params)) chart.view.signal(name, value);
+    chart.view.runAsync();
+  };
+
   // --------------------------------------------------------------- pasting
   // Cells of a spreadsheet pasted into a field of <table data-paste> fill the fields to its right and below.
   const paste = (event) => {
@@ -75,8 +90,25 @@
 
   // ------------------------------------------------------------ live pages
   // An element with data-lost inside one with sse-connect is shown while the connection is down.
-  const tell = (lost) => (event) => {
-    for (const notice of event.target.querySelectorAll?.("[data-lost]") ?? []) notice.hidden = !lost;
+  const show = (source, lost) => {
+    for (const notice of source.querySelectorAll?.("[data-lost]") ?? []) notice.hidden = !lost;
+  };
+  const tell = (lost) => (event) => show(event.target, lost);
+
+  // Where data-beat says after how many seconds at most something comes, silence is a lost connection too.
+  const heard = new WeakMap();
+  const hear = (event) => {
+    const source = event.target.closest?.("[data-beat]");
+    if (!source) return;
+    heard.set(source, performance.now());
+    show(source, false);
+  };
+  const listen = () => {
+    for (const source of document.querySelectorAll("[data-beat]")) {
+      if (!heard.has(source)) heard.set(source, performance.now());
+      if (document.hidden || performance.now() - heard.get(source) < 1000 * source.dataset.beat) continue;
+      show(source, true);
+    }
   };
 
   // A browser has six connections to a server: a page that nobody sees gives its own back.
@@ -88,6 +120,7 @@
         const fresh = element.cloneNode(true);
         element.replaceWith(fresh);
         window.htmx.process(fresh);
+        mount(fresh);
       }
     }
   };
@@ -99,5 +132,11 @@
     document.body.addEventListener("htmx:load", (event) => mount(event.detail.elt));
     document.body.addEventListener("htmx:sseError", tell(true));
     document.body.addEventListener("htmx:sseOpen", tell(false));
+    document.body.addEventListener("htmx:sseBeforeMessage", renew);
+    document.body.addEventListener("htmx:sseMessage", hear);
+    document.body.addEventListener("htmx:sseClose", (event) => {
+      if (event.detail.type === "message") event.target.removeAttribute("data-beat");
+    });
+    if (document.querySelector("[data-beat]")) setInterval(listen, 1000);
   });
 })();

@@ -17,12 +17,6 @@ class Mark(NamedTuple):
     sequence: int
     last_command: int
     answered: int
-    received_at: datetime
-
-    @property
-    def text(self) -> str:
-        """The same as one word."""
-        return "-".join(str(part) for part in self[:4])
 
 
 class Brief(NamedTuple):
@@ -71,7 +65,7 @@ def briefs(db: Session, session_ids: Sequence[int]) -> Mapping[int, Brief]:
 def mark(db: Session, session_id: int) -> Mark | None:
     """The state of the session's present run as a mark."""
     row = db.execute(
-        sa.select(StationRun.id, StationRun.sequence, StationRun.received_at)
+        sa.select(StationRun.id, StationRun.sequence)
         .where(StationRun.session_id == session_id)
         .order_by(StationRun.id.desc())
         .limit(1)
@@ -83,7 +77,7 @@ def mark(db: Session, session_id: int) -> Mark | None:
             StationCommand.run_id == row.id
         )
     ).one()
-    return Mark(row.id, row.sequence, last or 0, answered, row.received_at)
+    return Mark(row.id, row.sequence, last or 0, answered)
 
 
 def commands(db: Session, run_id: int, most: int) -> Sequence[StationCommand]:

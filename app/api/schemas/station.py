@@ -30,6 +30,8 @@ _LAST_NUMBER: Final = 100_000
 _LARGEST_WHOLE: Final = 2**53 - 1
 """Above it JSON numbers are no whole numbers any more in many languages."""
 
+Current = Annotated[Number, Field(ge=-1e6, le=1e6)]
+Left = Annotated[NotNegative, Field(le=366 * 86_400)]
 Whole = Annotated[int, Field(strict=True, ge=0, le=_LARGEST_WHOLE)]
 Take = Annotated[int, Field(strict=True, ge=0, lt=10_000, description="0 first attempt, 1 the next.")]
 Short = Annotated[str, StringConstraints(max_length=200, pattern=r"^[^\x00]*$")]
@@ -140,11 +142,11 @@ class StationReport(Incoming):
     sent_at: Annotated[Moment, Field(description="By the station's clock; the age is counted by ours.")]
     phase: Phase
     position: RunPosition | None = None
-    jx_ma: Annotated[Number | None, Field(description="Both currents now.")] = None
-    jy_ma: Number | None = None
+    jx_ma: Annotated[Current | None, Field(description="Both currents now.")] = None
+    jy_ma: Current | None = None
     settled: Annotated[bool, Field(strict=True)] | None = None
     fraction: Annotated[Number | None, Field(ge=0, le=1, description="Of the present record.")] = None
-    left_s: Annotated[NotNegative | None, Field(description="To the end of the cycle.")] = None
+    left_s: Annotated[Left | None, Field(description="To the end of the cycle.")] = None
     waiting: Annotated[Whole, Field(description="Records on the station's disk that are not sent yet.")] = 0
     cells: list[RunCell] = Field(default_factory=list, max_length=MOST_CELLS)
     events: list[ReportedEvent] = Field(default_factory=list, max_length=MOST_EVENTS)
