@@ -200,7 +200,10 @@ class Instrument:
         resource.timeout = connection.timeout_s * _MS_PER_S
         resource.read_termination = connection.read_termination or None
         for name, value in connection.attributes.items():
-            resource.set_visa_attribute(getattr(constants, name), value)
+            try:
+                resource.set_visa_attribute(getattr(constants, name), value)
+            except Exception as error:  # pyvisa-py has exceptions of its own for this
+                raise ValueError(f"{name}: {error}") from error
         return resource
 
     def _values(self, text: str = "") -> dict[str, Any]:
