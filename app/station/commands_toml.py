@@ -46,11 +46,11 @@ def command(table: Table, key: str, form: Form) -> Command:
     if value is None:
         table.missing(key)
         return Command(())
-    parts = value if isinstance(value, list) else [value]
+    parts = value if isinstance(value, list) and value else [value]
     exchanges: list[Exchange] = []
     assumed: dict[str, bool] = {}
     for number, part in enumerate(parts):
-        place = f"{key}[{number}]" if isinstance(value, list) else key
+        place = f"{key}[{number}]" if parts is value else key
         if isinstance(part, str):
             exchanges.append(Exchange(part))
         elif isinstance(part, dict):
@@ -166,6 +166,7 @@ def _units(part: Table, names: tuple[str, ...]) -> dict[str, str]:
 def _check_places(table: Table, key: str, form: Form, read: Command) -> None:
     """Every placeholder must be known here and take its example; those that matter must be used."""
     used: set[str] = set()
+    known = True
     for exchange in read.exchanges:
         try:
             names = {name for _, name, _, _ in Formatter().parse(exchange.send) if name is not None}
@@ -180,6 +181,7 @@ def _check_places(table: Table, key: str, form: Form, read: Command) -> None:
                         {"name": strange[0], "known": _listed(form.places)},
                     ),
                 )
+                known = False
                 continue
             exchange.text(form.places)
             used |= names
@@ -191,7 +193,7 @@ def _check_places(table: Table, key: str, form: Form, read: Command) -> None:
                 ),
             )
     for group in form.sends:
-        if not used & group:
+        if known and not used & group:
             table.wrong(
                 key,
                 Message(

@@ -54,6 +54,10 @@ _FETCH: Final = Form(
     may_give=frozenset({"t", "index"}),
 )
 
+_RECORDING: Final = {"duration_s": (0.01, 86400.0), "rate_hz": (0.001, 1e6), "block_samples": (1.0, 1e6)}
+_REST: Final = {"window_s": (0.001, 1e5), "limit_na_per_s": (1e-9, 1e9), "confidence": (0.5, 0.999999)}
+_CHECKS: Final = {"false_alarm": (1e-12, 0.5), "noise_factor": (1.0, 1e3)}
+
 
 @dataclass(frozen=True, slots=True)
 class Travel:
@@ -178,10 +182,10 @@ def read_station(data: bytes, filename: str) -> StationFile:
     read = StationFile(
         stand=_stand(whole.table("stand", required=True)),
         ammeter=_ammeter(whole.table("ammeter", required=True)),
-        recording=whole.table("recording").numbers_into(Recording),
-        settling=whole.table("settling", required=True).numbers_into(RestRule),
-        warm_up=whole.table("warm_up", required=True).numbers_into(RestRule),
-        checks=whole.table("checks").numbers_into(Thresholds),
+        recording=whole.table("recording").numbers_into(Recording, _RECORDING),
+        settling=whole.table("settling", required=True).numbers_into(RestRule, _REST),
+        warm_up=whole.table("warm_up", required=True).numbers_into(RestRule, _REST),
+        checks=whole.table("checks").numbers_into(Thresholds, _CHECKS),
         types={
             name: table.numbers_into(Expectations) for name, table in whole.table("types").tables().items()
         },

@@ -6,13 +6,17 @@ from dataclasses import MISSING, fields
 from difflib import get_close_matches
 from math import inf, isfinite
 from re import search
-from typing import Any, Final, TypeVar
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from app.exchange.problems import Problems, refuse
 from solver.errors import Message
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
 LARGEST_BYTES: Final = 2**20
-_Numbers = TypeVar("_Numbers")
+_Numbers = TypeVar("_Numbers", bound="DataclassInstance")
 _BARE: Final = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-"
 
 
@@ -101,14 +105,7 @@ class Table:
         if value is None:
             self.missing(key)
         elif not _is_number(value) or not smallest <= value <= largest:
-            self.wrong(
-                key,
-                Message(
-                    "not-a-number",
-                    "This must be a number from %(smallest)g to %(largest)g, without quotation marks.",
-                    {"smallest": smallest, "largest": largest},
-                ),
-            )
+            self.wrong(key, _bounds(smallest, largest))
         else:
             return float(value)
         return smallest if isfinite(smallest) else 0.0
@@ -138,14 +135,16 @@ class Table:
     def table(self, key: str, *, required: bool = False) -> "Table":
         """A table in this one; an empty one when it is not there."""
         value = self.value(key)
-        if value is None and required:
+        if isinstance(value, dict) or (value is None and not required):
+            return Table(value or {}, self._problems, self.place(key))
+        if value is None:
             self.missing(key)
-        if value is not None and not isinstance(value, dict):
+        else:
             self.wrong(
                 key, Message("not-a-table", "This must be a table. Begin it with its name in brackets.")
             )
-            value = None
-        return Table(value or {}, self._problems, self.place(key))
+        # One mistake is enough: what a table that is not there lacks is not told.
+        return Table({}, Problems(None))
 
     def tables(self) -> dict[str, "Table"]:
         """Every key of this table, each a table."""
@@ -174,12 +173,22 @@ class Table:
                 self.wrong(key, Message("not-a-flag", "This must be true or false, without quotation marks."))
         return found
 
-    def numbers_into(self, kind: type[_Numbers]) -> _Numbers:
-        """A dataclass of numbers made of the keys of its fields; a field's default holds where a key lacks."""
+    def numbers_into(
+        self, kind: type[_Numbers], ranges: Mapping[str, tuple[float, float]] = MappingProxyType({})
+    ) -> _Numbers:
+        """A dataclass of numbers made of the keys of its fields; a field's default holds where a key lacks.
+
+        Parameters
+        ----------
+        kind
+            The dataclass.
+        ranges
+            Smallest and largest value of a field; a number not below 0 where none is given.
+        """
         values = {}
-        for item in fields(kind):  # type: ignore[arg-type]
+        for item in fields(kind):
             default = None if item.default is MISSING else item.default
-            values[item.name] = self.number(item.name, default)
+            values[item.name] = self.number(item.name, default, *ranges.get(item.name, ()))
         self.finish()
         return kind(**values)
 
@@ -219,6 +228,20 @@ class Table:
         """Dotted name of a key, quoted as TOML wants it."""
         step = key if key and set(key) <= set(_BARE) else f'"{key}"'
         return f"{self._name}.{step}" if self._name else step
+
+
+def _bounds(smallest: float, largest: float) -> Message:
+    if isfinite(largest):
+        return Message(
+            "not-a-number",
+            "This must be a number from %(smallest)g to %(largest)g, without quotation marks.",
+            {"smallest": smallest, "largest": largest},
+        )
+    return Message(
+        "not-a-number",
+        "This must be a number not below %(smallest)g, without quotation marks.",
+        {"smallest": smallest},
+    )
 
 
 def _is_number(value: Any) -> bool:

@@ -132,7 +132,7 @@ def test_a_refused_question_is_told_in_the_instruments_words_not_as_silence():
     with wired() as found:
         short = replace(found.file.ammeter, connection=replace(found.file.ammeter.connection, timeout_s=0.3))
         ammeter = open_ammeter(short)
-        with pytest.raises(InstrumentFault, match="-230 .*nothing was acquired"):
+        with pytest.raises(InstrumentFault, match=r"-230 .*nothing was acquired"):
             ammeter.fetch(0, 10)
         assert ammeter.status().label == 0
         ammeter.close()
