@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 
 READING_TIME: Final = 0.1
 """Over which a live reading is averaged, s."""
+_LONGEST_WANDER: Final = 86_400.0
+"""Live readings wander no more after a day, s: slow noise is drawn from power-up on, which takes its time."""
 _OF_CONNECTION: Final = (Kind.INTERRUPTED,)
 
 
@@ -155,12 +157,13 @@ class Laboratory:
         if self.axes.turning:
             return self._slewing_currents()
         at, since = self.axes.case(), now - self.axes.at_rest_since
+        on = min(now, _LONGEST_WANDER)
         place, before = self._certified(at), self._certified(self.axes.came_from)
         if place is None:
             # Between its positions the stand stands as it says: no certificate knows better.
             stand = replace(self.bench.stand, certificate=certify([at[0]], [at[1]]))
-            return live_current(replace(self.bench, stand=stand, faults=()), Position(*at), now, since, None)
-        return live_current(self.bench, place, now, since, before)
+            return live_current(replace(self.bench, stand=stand, faults=()), Position(*at), on, since, None)
+        return live_current(self.bench, place, on, since, before)
 
     def _certified(self, angles: Angles | None) -> Position | None:
         """The fixed position at these angles, if there is one."""
