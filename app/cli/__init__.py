@@ -28,6 +28,7 @@ _WHERE: Final = {
     "upload": "upload:upload",
     "user": "accounts:users",
     "token": "accounts:tokens",
+    "station": "station:station",
     "validate": "validate:validate",
 }
 

@@ -2,6 +2,7 @@
 
 import signal
 import threading
+import time
 from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -16,7 +17,10 @@ Kind = Literal["pause", "resume", "skip", "retake", "stop"]
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A command from the page; without a place it is about the record that is being measured."""
+    """A command; without a place it is about the record that is being measured.
+
+    The service numbers its commands from 1; one from the keyboard has a negative number.
+    """
 
     id: int
     kind: Kind
@@ -52,6 +56,10 @@ class Controls:
                 if command.id not in self._known:
                     self._known.add(command.id)
                     self._given.append(command)
+
+    def resume(self) -> None:
+        """Go on, says somebody at the keyboard."""
+        self.give([Command(-time.time_ns(), "resume")])
 
     def take(self) -> Command | None:
         """The next command, if there is one."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.errors import AppError, problem
+from app.station.comparing import compare
 from app.station.contracts import EmergencyStop, InstrumentFault, InstrumentLost, Place
 from app.station.controls import StopAsked
 from app.station.durable import SpoolFailed
@@ -17,7 +18,7 @@ from app.station.entries import Abandoned, Said, Warmed
 from app.station.finishing import Finishing, NotFinished
 from app.station.live import Phase
 from app.station.measuring import TakeFailed, go, measure, settle
-from app.station.plan import Finish, Forward, Measure, Prepare, Solve, Step, WarmUp, next_step
+from app.station.plan import Compare, Finish, Forward, Measure, Prepare, Solve, Step, WarmUp, next_step
 from app.station.preparing import Preparing
 from app.station.workplace import Workplace
 from solver.errors import Message
@@ -108,6 +109,8 @@ class Cycle:
                 self._persist(self._warm_up)
             case Measure():
                 measure(self.at, step.target)
+            case Compare():
+                compare(self.at)
             case Forward():
                 self.finishing.forward()
             case Solve():

@@ -87,10 +87,11 @@ class Resumed:
 
 @dataclass(frozen=True, slots=True)
 class Planned:
-    """The positions in their order, and where they are from: `certificate`, `remembered`, `option`, `sixteen`."""
+    """The positions in their order and where they are from (`certificate`, `remembered`, `option`, `sixteen`)."""
 
     places: tuple[Place, ...]
     source: str
+    gyro_type: str | None = None
     kind: Literal["planned"] = "planned"
 
 
@@ -154,20 +155,23 @@ class Judged:
     kind: Literal["judged"] = "judged"
 
 
-@dataclass(frozen=True, slots=True)
-class Cleared:
-    """A suspicious take is accepted after all: what it disagreed with has been found wrong."""
-
-    attempt: int
-    kind: Literal["cleared"] = "cleared"
-
-
-@dataclass(frozen=True, slots=True)
-class Doubted:
-    """A target is to be measured anew, because its partner disagrees with it and has been measured twice."""
+class Doubt(NamedTuple):
+    """A target that disagrees with others, and how."""
 
     target: Target
-    kind: Literal["doubted"] = "doubted"
+    said: Said
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """The takes that count, beside each other: `doubted` are measured anew, `refuted` have been and stay wrong.
+
+    A line says the whole of it: what an earlier one refuted and this one does not is good again.
+    """
+
+    doubted: tuple[Doubt, ...] = ()
+    refuted: tuple[Doubt, ...] = ()
+    kind: Literal["compared"] = "compared"
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,7 +246,7 @@ class Finished:
 
 
 Entry = (
-    Begun | Resumed | Planned | Opened | Warmed | Started | Acquiring | Abandoned | Judged | Cleared | Doubted | Noted
+    Begun | Resumed | Planned | Opened | Warmed | Started | Acquiring | Abandoned | Judged | Compared | Noted
     | Commanded | Sent | Rejected | Queued | Solved | Unsolved | Finished
 )  # fmt: skip
 

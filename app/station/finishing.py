@@ -102,8 +102,9 @@ class Finishing:
         standing = self.at.history.standing(target)
         if standing is None or standing.judged is None:
             return
-        if standing.rejected is not None:
-            yield standing.rejected
+        against = standing.rejected or standing.refuted
+        if against is not None:
+            yield against
             return
         for finding in standing.judged.findings:
             yield finding.said

@@ -8,9 +8,8 @@ from app.station.entries import (
     Abandoned,
     Acquiring,
     Begun,
-    Cleared,
     Commanded,
-    Doubted,
+    Compared,
     Entry,
     Finished,
     Judged,
@@ -51,7 +50,7 @@ class Attempt:
     acquiring: Acquiring | None = None
     abandoned: Said | None = None
     judged: Judged | None = None
-    cleared: bool = False
+    refuted: Said | None = None
     sent: bool = False
     rejected: Said | None = None
 
@@ -75,7 +74,7 @@ class Attempt:
         """What it is worth; None while it is not judged."""
         if self.judged is None:
             return None
-        return "accepted" if self.cleared else self.judged.verdict
+        return "refused" if self.refuted is not None else self.judged.verdict
 
 
 @dataclass(slots=True)
@@ -86,13 +85,16 @@ class History:
     starts: int = 0
     """How often a program took the run up."""
     places: tuple[Place, ...] = ()
+    gyro_type: str | None = None
     session: int | None = None
     warmed: bool = False
     attempts: list[Attempt] = field(default_factory=list)
     asked_after: dict[Target, int] = field(default_factory=dict)
     """Number of takes that there were of a target when it was last asked for anew."""
     doubted: set[Target] = field(default_factory=set)
-    """Targets measured anew because their partners disagreed; once is enough."""
+    """Targets measured anew because others disagreed; once is enough."""
+    compared: bool = True
+    """Whether all takes that count have been seen beside each other."""
     skipped: set[Target] = field(default_factory=set)
     events: list[Event] = field(default_factory=list)
     commands: dict[int, Commanded] = field(default_factory=dict)
@@ -109,16 +111,15 @@ class History:
             case Resumed():
                 self.starts += 1
             case Planned():
-                self.places = entry.places
+                self.places, self.gyro_type = entry.places, entry.gyro_type
             case Opened():
                 self.session = entry.session
             case Warmed():
                 self.warmed = True
             case Started():
                 self.attempts.append(Attempt(entry))
-            case Doubted():
-                self.doubted.add(entry.target)
-                self._ask_anew(entry.target)
+            case Compared():
+                self._compare(entry)
             case Commanded():
                 self.commands[entry.command] = entry
                 self._obey(entry)
@@ -133,6 +134,7 @@ class History:
             case Noted():
                 pass
             case _:
+                self.compared = self.compared and not isinstance(entry, Judged)
                 _of_attempt(self.attempts[entry.attempt], entry)
 
     def _tell(self, at: datetime, entry: Entry) -> None:
@@ -144,6 +146,10 @@ class History:
             for finding in entry.findings:
                 level: Level = "error" if finding.verdict == "refused" else "warning"
                 self._event(at, level, finding.said, place)
+        elif isinstance(entry, Compared):
+            for level, doubts in (("warning", entry.doubted), ("error", entry.refuted)):
+                for doubt in doubts:
+                    self._event(at, level, doubt.said, doubt.target.place)
         elif isinstance(entry, Rejected):
             place = self.attempts[entry.attempt].target.place
             self._event(at, "error", entry.why, place)
@@ -154,11 +160,24 @@ class History:
     def _event(self, at: datetime, level: Level, said: Said, place: Place | None) -> None:
         self.events.append(Event(len(self.events) + 1, at, level, said, place))
 
+    def _compare(self, entry: Compared) -> None:
+        self.compared = True
+        for attempt in self.attempts:
+            attempt.refuted = None
+        for doubt in entry.refuted:
+            standing = self.standing(doubt.target)
+            if standing is not None:
+                standing.refuted = doubt.said
+        for doubt in entry.doubted:
+            self.doubted.add(doubt.target)
+            self._ask_anew(doubt.target)
+
     def _obey(self, entry: Commanded) -> None:
         if entry.outcome == "refused" or entry.target is None:
             return
         if entry.what == "skip":
             self.skipped.add(entry.target)
+            self.compared = False  # what waited for this target's next take waits no longer
         elif entry.what == "retake":
             self._ask_anew(entry.target)
 
@@ -182,6 +201,10 @@ class History:
         """The attempt that goes on, or went on when the station was stopped."""
         return self.attempts[-1] if self.attempts and self.attempts[-1].open else None
 
+    def on_server(self, target: Target) -> bool:
+        """Whether the service has any take of a target."""
+        return any(item.sent for item in self.takes(target))
+
     def takes(self, target: Target) -> list[Attempt]:
         """The judged takes of a target, in order."""
         return [item for item in self.attempts if item.judged is not None and item.target == target]
@@ -191,25 +214,35 @@ class History:
         takes = self.takes(target)
         return takes[-1] if takes else None
 
-    def accepted(self, target: Target) -> Attempt | None:
-        """The take that counts, if it is good."""
+    def candidate(self, target: Target) -> Attempt | None:
+        """The take that counts, if it is good by itself, whatever the others say."""
         found = self.standing(target)
-        return found if found is not None and found.verdict == "accepted" else None
+        judged = found.judged if found is not None else None
+        return None if judged is None or judged.verdict == "refused" else found
+
+    def usable(self, target: Target) -> Attempt | None:
+        """The take that counts, if it is good, or the last of suspicious ones."""
+        found = self.standing(target)
+        if found is None or found.verdict == "refused":
+            return None
+        return found if found.verdict == "accepted" or not self.wanted(target) else None
 
     def wanted(self, target: Target) -> bool:
         """Whether it is to be measured: never yet, asked for anew, or once more because a check failed."""
         if target in self.skipped:
             return False
-        since = self.takes(target)[self.asked_after.get(target, 0) :]
-        return not since or (len(since) == 1 and since[0].verdict != "accepted")
+        since = [item.judged for item in self.takes(target)[self.asked_after.get(target, 0) :]]
+        return not since or (len(since) == 1 and since[0] is not None and since[0].verdict != "accepted")
 
     def to_send(self) -> list[Attempt]:
-        """Accepted takes that count and the service has not answered for, in the order of measuring."""
-        waiting = (item for item in self.attempts if not item.sent and item.rejected is None)
-        return [item for item in waiting if item.verdict == "accepted" and self.standing(item.target) is item]
+        """Takes that count and the service has not answered for, in the order of measuring."""
+        usable = {id(self.usable(target)) for target in self.targets}
+        return [
+            item for item in self.attempts if id(item) in usable and not item.sent and item.rejected is None
+        ]
 
 
-def _of_attempt(attempt: Attempt, entry: Acquiring | Abandoned | Judged | Cleared | Sent | Rejected) -> None:
+def _of_attempt(attempt: Attempt, entry: Acquiring | Abandoned | Judged | Sent | Rejected) -> None:
     match entry:
         case Acquiring():
             attempt.acquiring = entry
@@ -217,8 +250,6 @@ def _of_attempt(attempt: Attempt, entry: Acquiring | Abandoned | Judged | Cleare
             attempt.abandoned = entry.why
         case Judged():
             attempt.judged = entry
-        case Cleared():
-            attempt.cleared = True
         case Sent():
             attempt.sent = True
         case Rejected():

@@ -23,7 +23,7 @@ class Journal:
     """An open journal; `entries` are those that were there when it was opened."""
 
     def __init__(self, path: Path) -> None:
-        self.entries, good = _read(path)
+        self.entries, good = read_journal(path)
         self._stream = durable.open_to_append(path, good)
         self._broken = False
 
@@ -50,8 +50,14 @@ def encoded(entry: dict[str, Any]) -> bytes:
     return _HEAD + b"%08x" % zlib.crc32(body) + _BETWEEN + body + b"}\n"
 
 
-def _read(path: Path) -> tuple[list[dict[str, Any]], int]:
-    """Read the entries and the length of the good part."""
+def read_journal(path: Path) -> tuple[list[dict[str, Any]], int]:
+    """Read the entries, and the length of the good part; a file that is not there has none.
+
+    Raises
+    ------
+    SpoolFailed
+        A line other than the last one is damaged.
+    """
     data = path.read_bytes() if path.exists() else b""
     entries: list[dict[str, Any]] = []
     good = at = number = 0

@@ -1,12 +1,23 @@
-"""What the cycle asks of the checks."""
+"""What the cycle asks of the checks, and the answer for a laboratory's thresholds and a type's expectations."""
 
-from collections.abc import Sequence
-from typing import Protocol
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
 
 from app.exchange.rows import CurrentRecord
-from app.station.contracts import Currents
-from app.station.entries import Finding, Target
+from app.station import checks, partners
+from app.station.checks import Expectations, Take, Thresholds
+from app.station.contracts import Currents, Place
+from app.station.entries import Finding, Said, Target, Verdict
 from app.station.history import History
+from app.station.settling import RestRule, RestWatch
+from solver.errors import Message
+
+_NA_PER_MA: Final = 1e6
+_WRONG_BY: Final = frozenset({"drifting"})
+"""Warnings that make a result wrong, where others make it uncertain: no calibration rests on them."""
 
 
 class Stillness(Protocol):
@@ -17,7 +28,7 @@ class Stillness(Protocol):
 
 
 class Judge(Protocol):
-    """What decides whether a signal, or a record, is good."""
+    """What decides whether a signal, a record, or a session's records together are good."""
 
     def settling(self) -> Stillness:
         """After a move."""
@@ -25,5 +36,105 @@ class Judge(Protocol):
     def warming(self) -> Stillness:
         """After power-on."""
 
-    def findings(self, record: CurrentRecord, target: Target, history: History) -> Sequence[Finding]:
-        """What is wrong with a record, by itself and beside what was measured before; nothing when it is good."""
+    def findings(
+        self, record: CurrentRecord, overload: bool, target: Target, history: History
+    ) -> Sequence[Finding]:
+        """What is wrong with a record; nothing when it is good."""
+
+    def odd(
+        self, means: Mapping[Place, Currents], history: History
+    ) -> Iterable[tuple[Message, tuple[Place, ...]]]:
+        """Places whose currents do not fit the others', and how."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Watch:
+    watch: RestWatch
+
+    def add(self, at_s: float, currents: Currents) -> bool:
+        return self.watch.add(at_s, *currents).settled is True
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """A `Judge` by rules.
+
+    Attributes
+    ----------
+    rest, warm
+        When the currents have settled after a move, and when the gyro is warm.
+    thresholds
+        Of the laboratory.
+    types
+        What is expected of each type of gyro.
+    largest_ma
+        End of the ammeter's range.
+    """
+
+    rest: RestRule
+    warm: RestRule
+    thresholds: Thresholds
+    types: Mapping[str, Expectations]
+    largest_ma: float = np.inf
+
+    def settling(self) -> Stillness:
+        """As the protocol says."""
+        return _Watch(RestWatch(self.rest))
+
+    def warming(self) -> Stillness:
+        """As the protocol says."""
+        return _Watch(RestWatch(self.warm))
+
+    def findings(
+        self, record: CurrentRecord, overload: bool, target: Target, history: History
+    ) -> Sequence[Finding]:
+        """By itself, and beside the first record when it is the closing one."""
+        take = Take(record.t_s, record.jx_ma, record.jy_ma, overload)
+        expected = self._expected(history)
+        found = [
+            _finding(item)
+            for item in checks.judged(take, self.thresholds, expected, largest_ma=self.largest_ma)
+        ]
+        if target.repeat and not any(item.verdict == "refused" for item in found):
+            found += self._closing(record, target, history)
+        return found
+
+    def odd(
+        self, means: Mapping[Place, Currents], history: History
+    ) -> Iterable[tuple[Message, tuple[Place, ...]]]:
+        """Pairs of partners whose sum is not that of the others."""
+        expected = self._expected(history)
+        for pair in partners.odd_pairs(means, expected.partner_na or self.thresholds.partner_na):
+            yield pair.message, pair.places
+
+    def _expected(self, history: History) -> Expectations:
+        return self.types.get(history.gyro_type or "", Expectations())
+
+    def _closing(self, record: CurrentRecord, target: Target, history: History) -> list[Finding]:
+        """Whether the session ends as it began: what changed meanwhile is in every other position too."""
+        first = history.usable(Target(target.theta_deg, target.psi_deg))
+        if first is None or first.judged is None or first.judged.jx_ma is None or first.judged.jy_ma is None:
+            return []
+        allowed = self._expected(history).drift_na or self.thresholds.drift_na
+        changes = (record.jx_ma.mean() - first.judged.jx_ma, record.jy_ma.mean() - first.judged.jy_ma)
+        change = max((float(change) * _NA_PER_MA for change in changes), key=abs)
+        if abs(change) <= allowed:
+            return []
+        message = Message(
+            "closing",
+            "The first position measured again at the end differs by %(change).3g nA, more than %(allowed).3g nA: "
+            "gyro, stand or ammeter changed during the session. Let them warm up and measure all of it again.",
+            {"change": change, "allowed": allowed},
+        )
+        return [Finding(Said.of(message), "refused")]
+
+
+def _finding(found: checks.Finding) -> Finding:
+    """A check's objection, and what the take is worth by it.
+
+    A warning about something that another take cannot change concerns the gyro, not the take.
+    """
+    verdict: Verdict = "suspicious" if found.again else "accepted"
+    if found.level == "error" or found.code in _WRONG_BY:
+        verdict = "refused"
+    return Finding(Said.of(found.message), verdict)

@@ -2,7 +2,7 @@
 
 import zlib
 from contextlib import closing
-from typing import Final
+from typing import Final, NoReturn
 
 from app.errors import AppError, problem
 from app.station.blocks import BlockFile
@@ -17,7 +17,15 @@ from solver.errors import Message
 _FORGOTTEN: Final = Message(
     "acquisition-forgotten", "The ammeter does not know the acquisition any more; it is begun anew."
 )
+_MOVED: Final = Message(
+    "stand-was-moved", "The stand was moved while nobody looked on; the record is begun anew."
+)
+_EMPTY: Final = Message("acquisition-empty", "The ammeter acquired nothing; the record is begun anew.")
 _FEWEST: Final = 2
+
+
+class _Lost(Exception):
+    """The attempt at hand was abandoned."""
 
 
 class TakeFailed(AppError):
@@ -32,16 +40,15 @@ def measure(at: Workplace, target: Target) -> None:
             if attempt.acquiring is None:
                 approach(at, attempt)
                 _start(at, attempt)
-            elif not _goes_on(at, attempt, blocks):
-                return
-            if not _collect(at, attempt, blocks):
-                return
-        except TargetLeft:
+            else:
+                _take_up(at, attempt, blocks)
+            overload = _collect(at, attempt, blocks)
+        except (TargetLeft, _Lost):
             return
         except (TakeFailed, InstrumentFault) as failed:
             _fail(at, attempt, failed)
             return
-        _judge(at, attempt, blocks)
+        _judge(at, attempt, blocks, overload)
 
 
 def _begin(at: Workplace, target: Target) -> Attempt:
@@ -79,13 +86,13 @@ def go(at: Workplace, place: Place, target: Target | None = None, take: int = 0)
     at.live.turn_to("moving", target, take)
     at.stand.move(place)
     deadline = at.clock.deadline(at.patience.move_s)
-    while (status := at.look()).moving:
+    while at.look().moving:
         if deadline.passed:
             at.stand.stop()
             raise TakeFailed(problem("stall", "The stand does not arrive at %(place)s in time; it was stopped.",
                                      place=shown(place)))  # fmt: skip
         at.wait()
-    _require_at(at, status, place)
+    _require_at(at, at.look(), place)  # a look whose encoders were asked before it came to rest is of no use
 
 
 def home(at: Workplace) -> None:
@@ -162,39 +169,22 @@ def _start(at: Workplace, attempt: Attempt) -> None:
     at.ammeter.start(label, attempt.started.take, begun.samples, begun.rate_hz)
 
 
-def _goes_on(at: Workplace, attempt: Attempt, blocks: BlockFile) -> bool:
-    """Whether an acquisition begun before a break can be taken up; else it is abandoned."""
+def _take_up(at: Workplace, attempt: Attempt, blocks: BlockFile) -> None:
+    """Make sure that an acquisition begun before a break can be gone on with."""
     begun, acquiring = at.history.begun, attempt.acquiring
     assert begun is not None
     assert acquiring is not None
     if blocks.samples >= begun.samples:
-        return True
-    acquired = at.ammeter.status()
-    if acquired.label != acquiring.label:
-        _give_up(
-            at,
-            attempt,
-            Message(
-                "acquisition-forgotten",
-                "The ammeter does not know the acquisition any more; it is begun anew.",
-            ),
-        )
-        return False
+        return
+    if at.ammeter.status().label != acquiring.label:
+        _give_up(at, attempt, _FORGOTTEN)
     status = at.look()
     if status.moving or not status.homed or apart_deg(status.place, attempt.target.place) > at.at_place_deg:
-        _give_up(
-            at,
-            attempt,
-            Message(
-                "stand-was-moved", "The stand was moved while nobody looked on; the record is begun anew."
-            ),
-        )
-        return False
-    return True
+        _give_up(at, attempt, _MOVED)
 
 
 def _collect(at: Workplace, attempt: Attempt, blocks: BlockFile) -> bool:
-    """Bring all samples onto the disk; False when the acquisition was lost and abandoned.
+    """Bring all samples onto the disk; tell whether the ammeter reported an overload.
 
     An acquisition that ends with fewer samples than it was asked for is whole: the checks tell what it lacks.
     """
@@ -203,12 +193,12 @@ def _collect(at: Workplace, attempt: Attempt, blocks: BlockFile) -> bool:
     assert acquiring is not None
     at.live.turn_to("acquiring", attempt.target, attempt.started.take)
     at.live.show(settled=True, fraction=blocks.samples / begun.samples)
-    deadline = at.clock.deadline(at.patience.silence_s)
+    deadline, overload = at.clock.deadline(at.patience.silence_s), False
     while blocks.samples < begun.samples:
         acquired = at.ammeter.status()
         if acquired.label not in (None, acquiring.label) or acquired.samples < blocks.samples:
             _give_up(at, attempt, _FORGOTTEN)
-            return False
+        overload = acquired.overload
         _require_at(at, at.look(), attempt.target.place)
         ready = min(acquired.samples, begun.samples) - blocks.samples
         if ready >= at.block_samples or (ready and not acquired.running):
@@ -223,9 +213,8 @@ def _collect(at: Workplace, attempt: Attempt, blocks: BlockFile) -> bool:
         else:
             at.wait()
     if blocks.samples < _FEWEST:
-        _give_up(at, attempt, Message("acquisition-empty", "The ammeter acquired nothing; it is begun anew."))
-        return False
-    return True
+        _give_up(at, attempt, _EMPTY)
+    return overload
 
 
 def _fetch(at: Workplace, blocks: BlockFile, most: int) -> None:
@@ -235,9 +224,9 @@ def _fetch(at: Workplace, blocks: BlockFile, most: int) -> None:
     blocks.append(block)
 
 
-def _judge(at: Workplace, attempt: Attempt, blocks: BlockFile) -> None:
+def _judge(at: Workplace, attempt: Attempt, blocks: BlockFile, overload: bool) -> None:
     record, digest = at.spool.keep_record(attempt, blocks)
-    findings = tuple(at.judge.findings(record, attempt.target, at.history))
+    findings = tuple(at.judge.findings(record, overload, attempt.target, at.history))
     jx_ma, jy_ma = float(record.jx_ma.mean()), float(record.jy_ma.mean())
     at.spool.add(Judged(attempt.number, worst(findings), findings, jx_ma, jy_ma, digest))
 
@@ -248,8 +237,9 @@ def _fail(at: Workplace, attempt: Attempt, failed: AppError) -> None:
     at.spool.add(Judged(attempt.number, "refused", (Finding(Said.of(message)),)))
 
 
-def _give_up(at: Workplace, attempt: Attempt, why: Message) -> None:
+def _give_up(at: Workplace, attempt: Attempt, why: Message) -> NoReturn:
     at.spool.add(Abandoned(attempt.number, Said.of(why)))
+    raise _Lost
 
 
 def worst(findings: tuple[Finding, ...]) -> Verdict:

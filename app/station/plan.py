@@ -24,6 +24,11 @@ class Measure:
 
 
 @dataclass(frozen=True, slots=True)
+class Compare:
+    """See the takes that count beside each other."""
+
+
+@dataclass(frozen=True, slots=True)
 class Forward:
     """Wait until the service has everything."""
 
@@ -38,7 +43,7 @@ class Finish:
     """Nothing is left to do."""
 
 
-Step = Prepare | WarmUp | Measure | Forward | Solve | Finish
+Step = Prepare | WarmUp | Measure | Compare | Forward | Solve | Finish
 
 
 def next_step(history: History, *, leave_out: bool) -> Step:
@@ -49,7 +54,8 @@ def next_step(history: History, *, leave_out: bool) -> Step:
     history
         What the journal says.
     leave_out
-        Whether the calibration shall be asked for without the positions that could not be measured.
+        Whether the calibration shall be asked for without the positions that could not be measured. One that
+        the service has in an earlier take cannot be left out from here.
     """
     if not history.places:
         return Prepare()
@@ -58,12 +64,16 @@ def next_step(history: History, *, leave_out: bool) -> Step:
     attempt = history.open_attempt
     if attempt is not None:
         return Measure(attempt.target)
+    if not history.compared:
+        return Compare()
     for target in history.targets:
         if history.wanted(target):
             return Measure(target)
     if history.session is None or history.to_send():
         return Forward()
-    if history.result is None and (leave_out or not missing(history)):
+    if history.result is None and all(
+        leave_out and not history.on_server(target) for target in missing(history)
+    ):
         return Solve()
     return Finish()
 
@@ -75,5 +85,5 @@ def missing(history: History) -> tuple[Target, ...]:
 
 
 def _is_there(history: History, target: Target) -> bool:
-    take = history.accepted(target)
+    take = history.usable(target)
     return take is not None and take.rejected is None

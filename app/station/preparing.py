@@ -51,26 +51,28 @@ class Preparing:
     spool: Spool
     service: Callable[[], Service]
     memory: Memory
-    asked: tuple[Place, ...] | None = None
+    asked: tuple[Place, ...] = ()
+    gyro_type: str | None = None
 
     def plan(self) -> None:
         """Write down which positions there are; the session is opened if the service can be reached."""
         begun = self.spool.history.begun
         assert begun is not None
-        certified = self._certified()
+        certified, gyro_type = self._certified()
         if certified:
             self.memory.remember(begun.stand, certified)
-        if self.asked:
-            self.spool.add(Planned(self.asked, "option"))
-        elif certified:
-            self.spool.add(Planned(certified, "certificate"))
-        elif remembered := self.memory.places(begun.stand):
-            self.spool.add(Planned(remembered, "remembered"))
-        else:
-            self.spool.add(Planned(SIXTEEN, "sixteen"))
+        remembered = self.memory.places(begun.stand)
+        choices = {
+            "option": self.asked,
+            "certificate": certified,
+            "remembered": remembered,
+            "sixteen": SIXTEEN,
+        }
+        source, places = next((source, places) for source, places in choices.items() if places)
+        self.spool.add(Planned(places, source, self.gyro_type or gyro_type))
 
-    def _certified(self) -> tuple[Place, ...]:
-        """Positions of the session's certificate; empty when the service is away."""
+    def _certified(self) -> tuple[tuple[Place, ...], str | None]:
+        """Positions of the session's certificate and the gyro's type; nothing when the service is away."""
         begun = self.spool.history.begun
         assert begun is not None
         try:
@@ -79,7 +81,7 @@ class Preparing:
                 with self.spool.lock:
                     if self.spool.history.session is None:
                         self.spool.add(Opened(session))
-                return service.certified_places(session)
+                return service.described(session)
         except Unreachable as away:
             self.spool.note("warning", away.problems[0].message)
         except ServerRefused as refused:
@@ -91,4 +93,4 @@ class Preparing:
             Message("certificate-unheard", "The certificate could not be asked for its positions; they are taken "
                     "as remembered, or as the method's sixteen."),
         )  # fmt: skip
-        return ()
+        return (), None

@@ -118,7 +118,11 @@ class Reporter(threading.Thread):
         }
 
     def _done(self, history: History) -> list[dict[str, Any]]:
-        told = [item for number, item in history.commands.items() if number not in self._answered]
+        told = [
+            item
+            for item in history.commands.values()
+            if item.command > 0 and item.command not in self._answered
+        ]
         return [
             {"id": item.command, "outcome": item.outcome, "message": item.said.text,
              "template": item.said.template, "values": item.said.values}

@@ -25,11 +25,11 @@ class Service:
         key = {"Idempotency-Key": f"station-{begun.run}"}
         return int(send_once(self._client, "POST", "/sessions", json=body, headers=key).json()["id"])
 
-    def certified_places(self, session: int) -> tuple[Place, ...]:
-        """Positions of the certificate that the session names, in its order."""
-        positions = send_once(self._client, "GET", f"/sessions/{session}").json()["positions"]
-        places = [Place(item["theta_deg"], item["psi_deg"]) for item in positions]
-        return tuple(dict.fromkeys(places))
+    def described(self, session: int) -> tuple[tuple[Place, ...], str]:
+        """Positions of the certificate that the session names, in its order, and the gyro's type."""
+        said = send_once(self._client, "GET", f"/sessions/{session}").json()
+        places = [Place(item["theta_deg"], item["psi_deg"]) for item in said["positions"]]
+        return tuple(dict.fromkeys(places)), str(said["type"])
 
     def put_record(self, session: int, attempt: Attempt, content: bytes) -> None:
         """Bring a record; the same bytes again change nothing."""

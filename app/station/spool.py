@@ -8,10 +8,11 @@ lock                    held while a station works on the folder
 
 import hashlib
 import threading
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Final, Self
 
 from filelock import FileLock, Timeout
 
@@ -23,15 +24,22 @@ from app.station.blocks import BlockFile
 from app.station.contracts import Place
 from app.station.entries import Entry, Level, Noted, Said, from_json, to_json
 from app.station.history import Attempt, History
-from app.station.journal import Journal
+from app.station.journal import Journal, read_journal
 from solver.errors import Message
+
+_JOURNAL: Final = "journal.jsonl"
 
 
 class Spool:
     """An open run's folder. Every thread of the station may `add` and read."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, told: Callable[[Entry, History], None] | None = None) -> None:
         """Open the folder, make it if need be, and read everything back.
+
+        Parameters
+        ----------
+        told
+            Hears of every entry once it is on the disk.
 
         Raises
         ------
@@ -41,11 +49,12 @@ class Spool:
             The disk cannot be written, or lost something.
         """
         self.folder = folder
+        self._told = told
         durable.make_folders(folder, folder / "attempts", folder / "records")
         self._lock_file = FileLock(folder / "lock", thread_local=False)
         _take(self._lock_file, folder)
         try:
-            self._journal = Journal(folder / "journal.jsonl")
+            self._journal = Journal(folder / _JOURNAL)
             self.history = History()
             for said in self._journal.entries:
                 self.history.apply(*from_json(said))
@@ -63,7 +72,9 @@ class Spool:
             at = datetime.now(UTC)
             self._journal.append(to_json(at, entry))
             self.history.apply(at, entry)
-        self.news.set()
+            self.news.set()
+            if self._told is not None:
+                self._told(entry, self.history)
 
     def note(self, level: Level, message: Message, place: Place | None = None) -> None:
         """Write what a person should know."""
@@ -125,6 +136,14 @@ class Spool:
 
     def _record(self, attempt: int) -> Path:
         return self.folder / "records" / f"{attempt:06d}.parquet"
+
+
+def history_in(folder: Path) -> History:
+    """What a folder's journal says, without touching it; that of a run that never began when there is none."""
+    history = History()
+    for said in read_journal(folder / _JOURNAL)[0]:
+        history.apply(*from_json(said))
+    return history
 
 
 def _take(lock: FileLock, folder: Path) -> None:

@@ -26,6 +26,11 @@ _DONE: Final[dict[Kind, Message]] = {
     "stop": Message("stop-asked", "The station stops; the same command takes the run up again."),
 }
 
+_UNKNOWN: Final = Message("no-such-target", "There is no such position in this cycle.")
+_MEASURED: Final = Message(
+    "already-measured", "This position has been measured; only one to come can be left out."
+)
+
 
 @dataclass(frozen=True, slots=True)
 class Patience:
@@ -140,8 +145,10 @@ class Workplace:
         attempt = self.history.open_attempt
         target = self._meant(command.place)
         if target is None:
-            unknown = Message("no-such-target", "There is no such position in this cycle.")
-            self._answer(command, "refused", unknown)
+            self._answer(command, "refused", _UNKNOWN)
+            return
+        if command.kind == "skip" and not self.history.wanted(target):
+            self._answer(command, "refused", _MEASURED)
             return
         said = _DONE[command.kind]
         self._answer(command, "done", said, target)

@@ -65,3 +65,34 @@ def test_a_calibration_without_the_refused_one_is_asked_for_when_told(room):
     history = room.run()
     assert history.result is not None
     assert len(history.finished.reasons) == 1
+
+
+def test_partners_that_disagree_are_both_measured_again(room):
+    pair = PLACES[:2]
+    room.judge.odd_until[pair] = 2
+    history = room.run()
+    assert [len(history.takes(Target(*place))) for place in PLACES] == [2, 2, 1]
+    assert [event.said.code for event in history.events] == ["partner", "partner"]
+    assert history.result is not None
+    # The first position's later take is what the closing record is compared with.
+    assert history.attempts[-1].target == CLOSING
+
+
+def test_partners_that_disagree_for_good_are_refused(room):
+    pair = PLACES[:2]
+    room.judge.odd_until[pair] = 9
+    history = room.run()
+    assert [len(history.takes(Target(*place))) for place in PLACES] == [2, 2, 1]
+    assert room.service.jobs == 0
+    named = [reason.text for reason in history.finished.reasons]
+    assert named == [f"{place} is not in the session: They disagree." for place in ("0/0", "0/180")]
+
+
+def test_a_suspicious_take_is_sent_when_the_next_is_no_better(room):
+    target = Target(*PLACES[2])
+    noise = objection("noise")._replace(verdict="suspicious")
+    room.judge.objections |= {(target, take): noise for take in range(9)}
+    history = room.run()
+    np.testing.assert_array_equal(samples(room.service.records[target][0]), true_record(PLACES[2], 1))
+    assert [event.said.code for event in history.events] == ["noise", "noise"]
+    assert history.result is not None

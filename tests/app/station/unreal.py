@@ -1,6 +1,6 @@
 """A stand, an ammeter, a judge and a service that obey at once, for tests of the cycle alone."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -20,6 +20,7 @@ from app.station.history import Attempt, History
 from app.station.preparing import Memory, Preparing
 from app.station.spool import Spool
 from app.station.workplace import Workplace
+from solver.errors import Message
 
 SAMPLES, RATE_HZ, BLOCK = 40, 200.0, 16
 PLACES = (Place(0.0, 0.0), Place(0.0, 180.0), Place(90.0, 0.0))
@@ -114,16 +115,29 @@ class Opinionated:
     """A judge that objects to the takes named."""
 
     objections: dict[tuple[Target, int], Finding] = field(default_factory=dict)
+    odd_until: dict[tuple[Place, Place], int] = field(default_factory=dict)
 
     def settling(self) -> AtOnce:
         return AtOnce()
 
     warming = settling
 
-    def findings(self, record: CurrentRecord, target: Target, history: History) -> Sequence[Finding]:
+    def findings(
+        self, record: CurrentRecord, overload: bool, target: Target, history: History
+    ) -> Sequence[Finding]:
         take = len(history.takes(target))
         found = self.objections.get((target, take))
         return [found] if found else []
+
+    def odd(
+        self, means: Mapping[Place, Currents], history: History
+    ) -> list[tuple[Message, tuple[Place, ...]]]:
+        """The pairs named, as long as one of them has not been measured so often."""
+        return [
+            (Message("partner", "They disagree."), pair)
+            for pair, takes in self.odd_until.items()
+            if set(pair) <= set(means) and min(len(history.takes(Target(*place))) for place in pair) < takes
+        ]
 
 
 def objection(code: str) -> Finding:
@@ -152,9 +166,9 @@ class UnrealService:
         self._answer()
         return self.sessions.setdefault(begun.run, len(self.sessions) + 1)
 
-    def certified_places(self, session: int) -> tuple[Place, ...]:
+    def described(self, session: int) -> tuple[tuple[Place, ...], str]:
         self._answer()
-        return self.places
+        return self.places, "GVK-6"
 
     def put_record(self, session: int, attempt: Attempt, content: bytes) -> None:
         self._answer()

@@ -1,0 +1,206 @@
+"""The automated stand: the cycle over VISA instruments, storing and forwarding."""
+
+import platform
+import sys
+import threading
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from app.cli.solve import Method
+from app.cli.tables import print_result
+from app.errors import AppError
+from app.exchange.planned import listed_positions
+from app.station import runs
+from app.station.clock import Clock
+from app.station.contracts import Place
+from app.station.controls import Controls, StopAsked
+from app.station.description import StationFile, station_file
+from app.station.entries import Acquiring, Entry, Judged, Planned, Sent, Warmed
+from app.station.finishing import named
+from app.station.history import History
+from app.station.instruments import open_ammeter, open_stand
+from app.station.preparing import SIXTEEN
+from app.station.running import Orders, live_through
+
+station = typer.Typer(
+    help="Drive a stand and an ammeter through the automated cycle.", pretty_exceptions_enable=False
+)
+
+Config = Annotated[Path, typer.Option("--config", help="TOML file that describes the instruments.")]
+StandAddress = Annotated[
+    str | None, typer.Option("--stand-address", help="VISA address that holds instead of the file's.")
+]
+AmmeterAddress = Annotated[str | None, typer.Option("--ammeter-address", help="Likewise, of the ammeter.")]
+
+
+@station.command()
+def run(
+    config: Config,
+    gyro: Annotated[str, typer.Option("--gyro", help="Serial number.")],
+    stand: Annotated[str, typer.Option("--stand", help="Stand, as the service calls it.")],
+    server: Annotated[str, typer.Option("--server", help="Address of the service.")],
+    token: Annotated[
+        str, typer.Option("--token", envvar="DRIFTBOOK_TOKEN", help="With the scopes upload and read.")
+    ],
+    spool: Annotated[
+        Path | None,
+        typer.Option("--spool", help="Folder of this run (default: one of the user's, an unfinished run first)."),
+    ] = None,
+    positions: Annotated[
+        str | None,
+        typer.Option("--positions", help="16, 8, or a list such as 0/0,0/90 (default: the certificate's)."),
+    ] = None,
+    certificate: Annotated[
+        str | None, typer.Option("--certificate", help="Number of the stand's certificate, if not the valid one.")
+    ] = None,
+    gyro_type: Annotated[
+        str | None, typer.Option("--type", help="The gyro's type for the checks (default: the service's).")
+    ] = None,
+    temperature: Annotated[
+        float | None, typer.Option("--temperature", min=-273.15, max=1000, help="Of the room, °C.")
+    ] = None,
+    method: Annotated[Method, typer.Option("--method", help="Of the calibration.")] = Method.LEAST_SQUARES,
+    leave_out: Annotated[
+        bool, typer.Option("--leave-out", help="Calibrate without positions that could not be measured.")
+    ] = False,
+    attended: Annotated[
+        bool | None,
+        typer.Option("--attended/--unattended", help="After an emergency stop, wait for a person or end "
+                     "(default: wait at a terminal)."),
+    ] = None,
+    release: Annotated[
+        bool, typer.Option("--release", help="Acknowledge an emergency stop: I made sure that all is safe.")
+    ] = False,
+    speed: Annotated[
+        float, typer.Option("--speed", min=0.01, max=1e6, help="Lab seconds per second of simulated instruments.")
+    ] = 1.0,
+    poll: Annotated[float, typer.Option("--poll", min=0.001, max=60, help="Lab seconds between looks.")] = 0.5,
+    stand_address: StandAddress = None,
+    ammeter_address: AmmeterAddress = None,
+) -> None:  # fmt: skip
+    """Measure a gyro in all positions and have it calibrated; the same command goes on with an unfinished run.
+
+    Ctrl-C ends it and keeps everything. Exit code 0: all positions measured and the calibration is there.
+    """
+    described = station_file(config, stand_address=stand_address, ammeter_address=ammeter_address)
+    orders = Orders(
+        gyro, stand, server, token, method.value, platform.node() or "station",
+        certificate, temperature, gyro_type, _places(positions), leave_out,
+        sys.stdin.isatty() if attended is None else attended, release,
+    )  # fmt: skip
+    folder = spool or runs.folder_for(gyro, stand)
+    typer.echo(f"run in {folder}")
+    controls = Controls()
+    if orders.attended:
+        _listen_to_keyboard(controls)
+    history = _lived(orders, described, folder, Clock(speed, poll), controls)
+    _verdict(orders, history)
+
+
+def _lived(orders: Orders, described: StationFile, folder: Path, clock: Clock, controls: Controls) -> History:
+    try:
+        with controls.on_signals():
+            return live_through(orders, described, folder, clock, controls, _Teller().tell)
+    except StopAsked as stopped:
+        typer.echo(f"driftbook: stopped by {stopped.why}. The same command goes on with {folder}.", err=True)
+        raise typer.Exit(1) from None
+
+
+def _listen_to_keyboard(controls: Controls) -> None:
+    """Let Enter mean: go on."""
+
+    def listen() -> None:
+        for _ in sys.stdin:
+            controls.resume()
+
+    threading.Thread(target=listen, name="keyboard", daemon=True).start()
+
+
+def _places(text: str | None) -> tuple[Place, ...]:
+    if text is None:
+        return ()
+    if text in ("16", "8"):
+        return SIXTEEN[: int(text)]
+    return tuple(Place(*place) for place in listed_positions(text, "--positions"))
+
+
+class _Teller:
+    """Tells on the terminal what happens, as it happens."""
+
+    def __init__(self) -> None:
+        self._told: int | None = None
+
+    def tell(self, entry: Entry, history: History) -> None:
+        """Tell of an entry, and of the events that it made."""
+        if self._told is None:
+            self._told = len(history.events) if entry.kind == "resumed" else 0
+        line = _line(entry, history)
+        if line:
+            typer.echo(line)
+        for event in history.events[self._told :]:
+            place = f"{event.place.theta_deg:g}/{event.place.psi_deg:g}: " if event.place else ""
+            typer.echo(
+                f"{event.level}: {place}{event.said.text} [{event.said.code}]", err=event.level != "info"
+            )
+        self._told = len(history.events)
+
+
+def _line(entry: Entry, history: History) -> str | None:
+    match entry:
+        case Planned():
+            return f"{len(entry.places)} positions ({entry.source})"
+        case Warmed():
+            return "warm"
+        case Acquiring():
+            return f"{named(history.attempts[entry.attempt].target)} …"
+        case Judged():
+            left = sum(history.wanted(target) for target in history.targets)
+            return f"{named(history.attempts[entry.attempt].target)} {entry.verdict}, {left} to go"
+        case Sent():
+            return f"{named(history.attempts[entry.attempt].target)} sent"
+    return None
+
+
+def _verdict(orders: Orders, history: History) -> None:
+    """Print the calibration and what it lacks; say by the exit code whether all is well."""
+    reasons = history.finished.reasons if history.finished else ()
+    if history.result is not None:
+        with orders.service() as service:
+            print_result(f"{orders.gyro} on {orders.stand}", service.calibration(history.result))
+            typer.echo(service.page(history.result))
+    for reason in reasons:
+        typer.echo(f"driftbook: {reason.text}", err=True)
+    if history.result is None:
+        typer.echo("driftbook: No calibration was asked for. Measure these positions again.", err=True)
+        raise typer.Exit(1)
+
+
+@station.command()
+def check(config: Config, stand_address: StandAddress = None, ammeter_address: AmmeterAddress = None) -> None:
+    """Ask both instruments who they are and how they stand; nothing moves."""
+    described = station_file(config, stand_address=stand_address, ammeter_address=ammeter_address)
+    stand, ammeter = open_stand(described.stand), open_ammeter(described.ammeter)
+    failed = False
+    for name, ask in (("stand", partial(_stand, stand)), ("ammeter", partial(_ammeter, ammeter))):
+        try:
+            typer.echo(f"{name}: {ask()}")
+        except AppError as error:
+            failed = True
+            typer.echo(f"{name}: {error.problems[0].text}", err=True)
+    if failed:
+        raise typer.Exit(1)
+
+
+def _stand(stand: Any) -> str:
+    identity, status = stand.identify(), stand.status()
+    where = f"at {status.place.theta_deg:g}/{status.place.psi_deg:g}"
+    homed = "reference known" if status.homed else "no reference"
+    return f"{identity}; {where}, {homed}" + (", EMERGENCY STOP" if status.emergency_stop else "")
+
+
+def _ammeter(ammeter: Any) -> str:
+    identity, currents = ammeter.identify(), ammeter.reading()
+    return f"{identity}; Jx {currents.jx_ma:.6g} mA, Jy {currents.jy_ma:.6g} mA"

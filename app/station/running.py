@@ -1,0 +1,150 @@
+"""A run put together from its parts, and lived through once: from the lock on its folder to its release."""
+
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from app.station import runs
+from app.station.clock import Clock
+from app.station.contracts import Place
+from app.station.controls import Controls
+from app.station.cycle import Cycle
+from app.station.description import StationFile
+from app.station.entries import Begun, Entry, Resumed
+from app.station.finishing import Finishing
+from app.station.forwarding import Forwarder
+from app.station.history import History
+from app.station.instruments import open_ammeter, open_stand
+from app.station.judging import Rules
+from app.station.live import Live
+from app.station.preparing import Memory, Preparing
+from app.station.reporting import PATIENCE_S, Reporter
+from app.station.service import Service
+from app.station.spool import Spool
+from app.station.workplace import Patience, Workplace
+
+
+@dataclass(frozen=True, slots=True)
+class Orders:
+    """What a person asked for.
+
+    Attributes
+    ----------
+    places
+        Positions, where the certificate's are not meant.
+    leave_out
+        Whether to ask for the calibration without positions that could not be measured.
+    attended, release
+        As for `Cycle`.
+    station
+        What people call this computer.
+    """
+
+    gyro: str
+    stand: str
+    server: str
+    token: str
+    method: str
+    station: str
+    certificate: str | None = None
+    temperature_c: float | None = None
+    gyro_type: str | None = None
+    places: tuple[Place, ...] = ()
+    leave_out: bool = False
+    attended: bool = False
+    release: bool = False
+
+    def service(self, timeout_s: float = 60.0) -> Service:
+        """A new connection to the service."""
+        return Service(self.server, self.token, timeout_s)
+
+
+def live_through(
+    orders: Orders,
+    described: StationFile,
+    folder: Path,
+    clock: Clock,
+    controls: Controls,
+    told: Callable[[Entry, History], None] | None = None,
+) -> History:
+    """Begin the run of a folder, or go on with it, until nothing is left to do.
+
+    Returns
+    -------
+    History
+        Of the whole run; `finished` says what its calibration lacks.
+
+    Raises
+    ------
+    AppError
+        It cannot be begun or gone on with now; the folder keeps what there is.
+    StopAsked
+        Somebody ended it; likewise.
+    """
+    with Spool(folder, told) as spool:
+        _begin(spool, orders, described)
+        live = Live()
+        with _helpers(orders, spool, live, controls) as (forwarder, reporter):
+            at = _workplace(described, spool, clock, controls, live)
+            at.helpers = (forwarder, reporter)
+            preparing = Preparing(
+                spool,
+                orders.service,
+                Memory(runs.home() / "certificates.json"),
+                orders.places,
+                orders.gyro_type,
+            )
+            finishing = Finishing(at, forwarder, orders.service, orders.method, orders.leave_out)
+            Cycle(at, preparing, finishing, orders.attended, orders.release).run()
+        return spool.history
+
+
+def _begin(spool: Spool, orders: Orders, described: StationFile) -> None:
+    record = described.recording
+    wanted = Begun(
+        run=str(uuid.uuid4()), gyro=orders.gyro, stand=orders.stand, started_at=datetime.now(UTC),
+        samples=round(record.duration_s * record.rate_hz), rate_hz=record.rate_hz,
+        certificate=orders.certificate, temperature_c=orders.temperature_c,
+    )  # fmt: skip
+    runs.require_same(spool.folder, spool.history, wanted, orders.places)
+    if not spool.history.places:
+        spool.add(wanted)
+    spool.add(Resumed())
+
+
+@contextmanager
+def _helpers(
+    orders: Orders, spool: Spool, live: Live, controls: Controls
+) -> Iterator[tuple[Forwarder, Reporter]]:
+    forwarder = Forwarder(spool, orders.service)
+    reporter = Reporter(orders.station, spool, live, controls, lambda: orders.service(PATIENCE_S))
+    forwarder.start()
+    reporter.start()
+    try:
+        yield forwarder, reporter
+    finally:
+        forwarder.stop()
+        reporter.stop()
+
+
+def _workplace(
+    described: StationFile, spool: Spool, clock: Clock, controls: Controls, live: Live
+) -> Workplace:
+    stand, ammeter = described.stand, described.ammeter
+    return Workplace(
+        spool=spool,
+        stand=open_stand(stand),
+        ammeter=open_ammeter(ammeter),
+        judge=Rules(described.settling, described.warm_up, described.checks, described.types, ammeter.largest_ma),
+        clock=clock,
+        controls=controls,
+        live=live,
+        patience=Patience(
+            stand.homing_s, stand.moving_s, described.settling.allowed_s, described.warm_up.allowed_s
+        ),
+        at_place_deg=stand.arrival_deg,
+        block_samples=round(described.recording.block_samples),
+    )  # fmt: skip
