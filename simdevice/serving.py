@@ -52,6 +52,7 @@ class _Service:
         for talk in self._talks:
             talk.cancel()
         await asyncio.gather(*self._talks, return_exceptions=True)
+        await asyncio.sleep(0)  # the loop closes the sockets in its next round
 
     async def talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """With one client, until it goes."""
@@ -61,9 +62,11 @@ class _Service:
         try:
             with contextlib.suppress(ConnectionError):  # the client is gone; the instrument stays as it is
                 await self._answer_all(reader, writer)
+                writer.close()
+                await writer.wait_closed()
         finally:
             self._talks.discard(talk)
-            writer.close()
+            writer.transport.abort()
 
     async def _answer_all(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         while (message := await self._message(reader)) is not None:
