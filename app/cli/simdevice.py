@@ -11,7 +11,8 @@ from typing import Annotated
 
 import typer
 
-from app.errors import Invalid, problem
+from app.cli.signal_options import blaming
+from app.errors import Conflict, Invalid, problem
 from simdevice.ammeter_device import AmmeterDevice
 from simdevice.bench import Bench
 from simdevice.clock import Clock
@@ -64,18 +65,30 @@ def serve(
     ] = None,
     fault: Annotated[
         list[str] | None,
-        typer.Option("--fault", help=f"KIND[@THETA/PSI][!], ! for every take. Kinds: {', '.join(Kind)}."),
+        typer.Option(
+            "--fault",
+            metavar="KIND[@THETA/PSI][!]",
+            help="What goes wrong, such as stall@90/180; again for more. Without a place the seed draws one; ! "
+            f"hits every take or movement instead of the first. Kinds: {', '.join(Kind)}.",
+        ),
     ] = None,
 ) -> None:
     """Serve a simulated stand and ammeter as SCPI instruments until Ctrl-C."""
     clock = Clock(_moment(powered_on), speed)
     bench = _bench(scenario, seed, latitude, rate, duration)
-    laboratory = _laboratory(bench, clock, fault or ())
+    with blaming("--fault"):
+        laboratory = Laboratory(bench, clock, [parse(text) for text in fault or ()])
     devices = [
         device(laboratory, f"Driftbook,{model},{seed},{version('driftbook')}")
         for device, model in ((StandDevice, "SIM-STAND"), (AmmeterDevice, "SIM-AMMETER"))
     ]
-    asyncio.run(_serve([Instrument(device) for device in devices], host, [stand_port, ammeter_port]))
+    try:
+        asyncio.run(_serve([Instrument(device) for device in devices], host, [stand_port, ammeter_port]))
+    except OSError as error:
+        raise Conflict(
+            problem("ports-taken", "The instruments cannot listen on %(host)s (%(why)s). Choose other ports with "
+                    "--stand-port and --ammeter-port.", host=host, why=error.strerror or str(error))
+        ) from error  # fmt: skip
 
 
 async def _serve(instruments: Sequence[Instrument], host: str, ports: Sequence[int]) -> None:
@@ -103,13 +116,6 @@ def _bench(name: str, seed: int, latitude: float | None, rate: float, duration: 
     if latitude is None:
         return bench
     return replace(bench, stand=replace(bench.stand, latitude=rad_from_deg(latitude)))
-
-
-def _laboratory(bench: Bench, clock: Clock, faults: Sequence[str]) -> Laboratory:
-    try:
-        return Laboratory(bench, clock, [parse(text) for text in faults])
-    except ValueError as error:
-        raise Invalid(problem("bad-fault", "%(why)s", column="--fault", why=str(error))) from None
 
 
 def _moment(text: str | None) -> float:
