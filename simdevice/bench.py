@@ -12,7 +12,9 @@ The current of a channel is a sum of parts, each with its own parameters and its
 The ammeter reads the sum at the moments of its clock, and faults befall what it read. A record
 depends on the bench, the position and its repeat alone, so records may be made in any order and by
 any number of workers, and the first m of n samples are those of m. A part that is off is neither
-drawn nor computed, and a part switched on changes no number of another's.
+drawn nor computed, and a part switched on changes no number of another's: all go through the
+torquers of the reference temperature, and with an ammeter without steps the difference of two
+sessions is the part alone, to the rounding of the sum. Jitter and faults are no parts of that sum.
 """
 
 from collections.abc import Sequence
@@ -118,9 +120,11 @@ def position_record(bench: Bench, position: Position, count: int | None = None) 
     Raises
     ------
     ValueError
-        When the stand's certificate does not cover the position.
+        When the stand's certificate does not cover the position, or no sample is asked for.
     """
     n = bench.samples if count is None else count
+    if n < 1:
+        raise ValueError(f"A record of {n} samples was asked for: it needs at least one sample.")
     t = np.arange(n) / bench.rate
     begin = bench.begin(position)
     kinds = bench.kinds_at(position)

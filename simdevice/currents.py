@@ -60,7 +60,8 @@ class Case:
             # More drift is less current: it turns the rotor in the torquers' stead.
             parts.append(np.array(self.gyro.currents_for(-drifts[0], -drifts[1])))
         if bench.temperature is not None and bench.temperature.sensitivity:
-            parts.append(bench.temperature.currents(self.gyro, self.rate, self.force, t))
+            # Of the gyro without its turn-on offset: parts add up, products of two small ones are left out.
+            parts.append(bench.temperature.currents(bench.gyro, self.rate, self.force, t))
         return total(parts)
 
     def transient(self, previous: "Case", t: Array) -> Array | None:

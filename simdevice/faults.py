@@ -146,8 +146,9 @@ def parse(text: str, kinds: Sequence[Kind] = tuple(Kind)) -> Fault:
 def located(faults: Sequence[Fault], certificate: Certificate, seed: int) -> tuple[Fault, ...]:
     """The same faults, each with a place.
 
-    A fault without one gets a place of the certificate that no fault named or drawn before it has,
-    as long as there is one; a wrong position gets one whose neighbour the certificate covers.
+    A fault without one gets a place of the certificate that no fault before it has, as long as there
+    is one; a wrong position gets one whose neighbour the certificate covers. A further fault at the
+    end moves none before it.
 
     Raises
     ------
@@ -157,7 +158,7 @@ def located(faults: Sequence[Fault], certificate: Certificate, seed: int) -> tup
     positions = [
         Position(t, p) for t, p in zip(certificate.theta.tolist(), certificate.psi.tolist(), strict=True)
     ]
-    taken = {fault.position.place for fault in faults if fault.position}
+    taken: set[tuple[int, int]] = set()
     found: list[Fault] = []
     for fault in faults:
         if fault.position is None:
