@@ -18,6 +18,7 @@ from app.api import (
     gyros,
     history,
     jobs,
+    loop,
     openapi,
     planning,
     positions,
@@ -41,8 +42,8 @@ _DESCRIPTION: Final = (
     "results. Every number is in the unit that its field's name ends with."
 )
 _NOUNS: Final = (
-    gyros, history, types, stands, planning, certificates, uploads, sessions, positions, calibrations, simulations,
-    station, jobs, validation, docs,
+    gyros, history, types, loop, stands, planning, certificates, uploads, sessions, positions, calibrations,
+    simulations, station, jobs, validation, docs,
 )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ Addresses: ``/`` today · ``/sessions`` ``/sessions/new`` ``/sessions/{id}`` ``/
 ``/gyros/{serial}/edit`` · ``/types/{name}`` · ``/stands`` ``/stands/{name}``
 ``/stands/{name}/plan`` ``/stands/{name}/uncertainty`` · ``/certificates``
 ``/certificates/{stand}/{number}`` · ``/simulations/new`` · ``/jobs/{id}`` · ``/method`` ·
-``/validation`` ``/validation/{report}``.
+``/loop`` · ``/validation`` ``/validation/{report}``.
 
 State is in the address: filters, sorting and pages of a list are GET. A form that cannot be used
 comes back with status 422 and what was typed. `mount` puts everything into an application whose
@@ -25,6 +25,7 @@ from app.pages import (
     history,
     jobs,
     live,
+    loop,
     measurements,
     method,
     planning,
@@ -46,7 +47,7 @@ __all__ = ["errors", "mount", "router"]
 router = APIRouter(include_in_schema=False)
 for _noun in (
     today, sessions, session_files, entry, live, results, measurements, gyros, history, types, stands, planning,
-    uncertainty, certificates, simulations, jobs, method, validation, sign_in, choices, assets,
+    uncertainty, certificates, simulations, jobs, method, loop, validation, sign_in, choices, assets,
 ):  # fmt: skip
     router.include_router(_noun.router)
 

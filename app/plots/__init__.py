@@ -10,13 +10,16 @@ and a change of theme needs no redrawing. `theme.printed` puts the light or dark
 
 from app.plots.allan import AllanPoint, MeanPoint, allan
 from app.plots.autocorrelation import autocorrelation
+from app.plots.bode import MarginMark, bode
 from app.plots.convergence import Change, convergence
 from app.plots.drift import DriftEvent, DriftLimit, DriftPoint, drift
 from app.plots.live import LivePoint, live
 from app.plots.live import news as live_news
 from app.plots.pareto import TradeMark, pareto
+from app.plots.poles import Pole, poles
 from app.plots.record import Stretch, record
 from app.plots.residuals import LIMIT_SD, Place, Residual, decade, residuals
+from app.plots.step_response import step_response
 from app.plots.theme import printed
 from app.plots.warming import warm_up
 
@@ -28,21 +31,26 @@ __all__ = [
     "DriftLimit",
     "DriftPoint",
     "LivePoint",
+    "MarginMark",
     "MeanPoint",
     "Place",
+    "Pole",
     "Residual",
     "Stretch",
     "TradeMark",
     "allan",
     "autocorrelation",
+    "bode",
     "convergence",
     "decade",
     "drift",
     "live",
     "live_news",
     "pareto",
+    "poles",
     "printed",
     "record",
     "residuals",
+    "step_response",
     "warm_up",
 ]

@@ -5,12 +5,15 @@ from typing import Final
 
 from app.plots.allan import template as allan_template
 from app.plots.autocorrelation import template as autocorrelation_template
+from app.plots.bode import template as bode_template
 from app.plots.convergence import template as convergence_template
 from app.plots.drift import template as drift_template
 from app.plots.live import template as live_template
 from app.plots.pareto import template as pareto_template
+from app.plots.poles import template as poles_template
 from app.plots.record import template as record_template
 from app.plots.residuals import template as residuals_template
+from app.plots.step_response import template as step_response_template
 
 _DELAY_S: Final = 2.0
 
@@ -36,6 +39,9 @@ def make_templates() -> None:
     allan_template()
     autocorrelation_template()
     pareto_template("", "")
+    bode_template()
+    poles_template()
+    step_response_template()
     for with_dates in (True, False):
         drift_template(with_dates)
     for channel in ("x", "y"):

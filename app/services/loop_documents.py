@@ -95,8 +95,8 @@ def as_json(found: LoopAnswer) -> dict[str, Any]:
         "verdict": message_json(verdict_message(found)),
         "poles": rows(found, "poles"),
         "margins": None if margins is None else {
-            "worse": _margins(margins.worse), "positive": _margins(margins.positive),
-            "negative": _margins(margins.negative),
+            "worse": margin_numbers(margins.worse), "positive": margin_numbers(margins.positive),
+            "negative": margin_numbers(margins.negative),
         },
         "settling_time_s": found.settling,
         "settled_within": SETTLED,
@@ -113,7 +113,8 @@ def _columns(found: LoopAnswer, table: Table) -> dict[str, list[float | None]]:
     return {name: list(values) for name, values in zip(COLUMNS[table], columns, strict=True)}
 
 
-def _margins(side: Margins) -> dict[str, float | None]:
+def margin_numbers(side: Margins) -> Row:
+    """The margins of one sign of ω, or the worse ones."""
     factor, gain_at = (side.gain.value, side.gain.omega) if side.gain else (None, None)
     angle, phase_at = (math.degrees(side.phase.value), side.phase.omega) if side.phase else (None, None)
     bandwidth = side.bandwidth
