@@ -104,7 +104,7 @@ def _cell(place: Place, states: Sequence[CellState], number: int, *, current: bo
     shape, word = _look(found)
     again = busy is None and any(item in _TAKEN for item in found)
     if asked:
-        shape, word = "due", gettext("again, asked for")
+        shape, word = "due", gettext("to retake")
     return LiveCell(number, *place, shape, word, current, again and not asked, asked)
 
 

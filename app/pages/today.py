@@ -1,10 +1,13 @@
-"""The first screen: the open session with its one next action, and the latest sessions."""
+"""The first screen: the stand now with its one next action, and the latest sessions."""
 
 from datetime import UTC, datetime
 
 from fastapi import APIRouter, Request, Response
 
+from app.pages import live_view
 from app.pages.base import Reader, TheLab, render
+from app.pages.live import look
+from app.pages.live_map import Numbers
 from app.pages.positions import last_measured, next_position, position_map
 from app.services import gyros, overview, stands
 
@@ -19,10 +22,16 @@ def today(request: Request, person: Reader, lab: TheLab) -> Response:
         has_gyro = bool(gyros.gyros(work, limit=1).items)
         known = stands.stands(work)
     current = seen.current
+    run = current.session.station if current else None
+    watched = (
+        look(lab, person, current.session.id, Numbers(current.positions))
+        if current and run and run.under_way
+        else None
+    )
     return render(
         request, "today/page.html", current=current, recent=seen.recent, now=datetime.now(UTC).astimezone(),
         coming=next_position(current.positions) if current else None,
         last=last_measured(current) if current else None,
-        map=position_map(current) if current else None,
+        map=position_map(current) if current else None, watched=watched, view=live_view,
         has_gyro=has_gyro, has_stand=bool(known), certified=any(item.certificate for item in known),
     )  # fmt: skip

@@ -15,7 +15,17 @@ from sqlalchemy.orm import Session
 from app.jobs.tables import DBOS_TABLES
 from app.store.database import Database
 from app.store.migrate import MIGRATIONS, is_current, ours, upgrade
-from app.store.tables import Base, Calibration, GyroType, Measurement, Stand, StandCertificate
+from app.store.tables import (
+    Base,
+    Calibration,
+    GyroType,
+    Measurement,
+    Stand,
+    StandCertificate,
+    StationCommand,
+    StationEvent,
+    StationRun,
+)
 
 AT = datetime(2026, 3, 1, 9, 30, tzinfo=UTC).replace(tzinfo=None)  # as it is stored
 ROWS: dict[str, dict[str, Any]] = {
@@ -55,15 +65,15 @@ ROWS: dict[str, dict[str, Any]] = {
 """One row in every table that the second migration touches, and in those that they need."""
 
 
-@pytest.fixture
-def at_first(tmp_path: Path):
-    """A database as the first release left it, with rows."""
+@pytest.fixture(params=["0001", "0002"])
+def old(request: pytest.FixtureRequest, tmp_path: Path):
+    """A database as an earlier release left it, with rows."""
     database = Database(f"sqlite:///{(tmp_path / 'book.sqlite').as_posix()}")
     with database.engine.execution_options(writing=True).begin() as connection:
         config = Config()
         config.set_main_option("script_location", str(MIGRATIONS))
         config.attributes["connection"] = connection
-        command.upgrade(config, "0001")
+        command.upgrade(config, request.param)
         tables = sa.MetaData()
         tables.reflect(connection)
         for name, row in ROWS.items():
@@ -83,11 +93,11 @@ def test_migrated_and_declared_tables_are_the_same(tmp_path: Path):
     database.close()
 
 
-def test_a_database_of_the_first_release_keeps_its_rows(at_first: Database):
-    assert not is_current(at_first)
-    upgrade(at_first)
-    assert is_current(at_first)
-    with at_first.engine.begin() as connection:
+def test_a_database_of_an_earlier_release_keeps_its_rows(old: Database):
+    assert not is_current(old)
+    upgrade(old)
+    assert is_current(old)
+    with old.engine.begin() as connection:
         tables = sa.MetaData()
         tables.reflect(connection)
         for name, expected in ROWS.items():
@@ -97,9 +107,9 @@ def test_a_database_of_the_first_release_keeps_its_rows(at_first: Database):
         assert connection.execute(sa.text("PRAGMA foreign_key_check")).all() == []
 
 
-def test_rows_of_the_first_release_state_nothing_new(at_first: Database):
-    upgrade(at_first)
-    with Session(at_first.engine) as session:
+def test_rows_of_an_earlier_release_state_nothing_new(old: Database):
+    upgrade(old)
+    with Session(old.engine) as session:
         stand, certificate = session.get_one(Stand, 1), session.get_one(StandCertificate, 1)
         assert stand.uncertainty is None
         assert (certificate.u_alpha_common_arcsec, certificate.u_gamma_common_arcsec) == (None, None)
@@ -108,6 +118,20 @@ def test_rows_of_the_first_release_state_nothing_new(at_first: Database):
         assert ([row.high for row in kind.limits], kind.nominals) == ([3.5], [])
         assert session.get_one(Measurement, 1).dof_jx is None
         assert [row.coverage_factor for row in session.get_one(Calibration, 1).parameters] == [None]
+        for table in (StationRun, StationEvent, StationCommand):
+            assert session.scalars(sa.select(table)).all() == []
+
+
+def test_a_downgraded_database_can_be_upgraded_again(old: Database):
+    upgrade(old)
+    with old.engine.execution_options(writing=True).begin() as connection:
+        config = Config()
+        config.set_main_option("script_location", str(MIGRATIONS))
+        config.attributes["connection"] = connection
+        command.downgrade(config, "0002")
+        assert "station_run" not in sa.inspect(connection).get_table_names()
+    upgrade(old)
+    assert is_current(old)
 
 
 def test_the_job_engines_tables_are_left_alone():
