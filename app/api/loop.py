@@ -17,6 +17,5 @@ def found(query: Annotated[LoopQuery, Query()], caller: Reader) -> Loop:
     with caller.read() as work:
         usual = loop.usual(work, query.type)
     given = {name: value for name in loop.MEMBERS if (value := getattr(query, name)) is not None}
-    loop.check_duration(query.duration_s)
     answer = loop.answer(loop.changed(usual, given), query.duration_s)
     return Loop.model_validate(loop_documents.as_json(answer))

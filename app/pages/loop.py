@@ -28,7 +28,6 @@ class _Question:
     def answered(self) -> loop.LoopAnswer:
         """Raise `Invalid` with what is wrong with the form."""
         given, duration = loop_form.given(self.form)
-        loop.check_duration(duration)
         return loop.answer(loop.changed(GVK_6, given), duration)
 
 
@@ -43,7 +42,6 @@ def page(request: Request, person: Reader, lab: TheLab) -> Response:
         form, status = form.with_problems(*error.problems), error.status
     return render(
         request, "loop/page.html", status=status, form=form, starts=asked.starts, start=asked.start, shown=shown,
-        printed=asked.start == loop_form.PRINTED,
     )  # fmt: skip
 
 

@@ -2,17 +2,22 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 from app.figures import entered
-from app.i18n import MINUS, gettext, localised
+from app.i18n import MINUS, gettext, localised, marked
 from app.pages.forms import Fields, Form
-from app.services.loop import MEMBERS
+from app.services.loop import MEMBERS, problems_of
 from app.services.views import TypeView
-from simdevice.dynamics import GVK_6_AS_PRINTED, LoopParameters
+from simdevice.dynamics import GVK_6, GVK_6_AS_PRINTED, LoopParameters
 
 DURATION: Final = "duration_s"
-PRINTED: Final = "printed"
+_STARTS: Final = {
+    "printed": (marked("with T1 as printed"), GVK_6_AS_PRINTED),
+    "proportional": (marked("proportional only"), replace(GVK_6, integral_time=math.inf, lag_time=0.0)),
+}
+"""Loops of the paper's gyro to start from, beside its own."""
 _INFINITE: Final = ("∞", "inf")
 _LONGEST: Final = 100
 
@@ -32,15 +37,15 @@ def start_of(query: Mapping[str, str]) -> tuple[str, str | None]:
 
 
 def started(loop: LoopParameters, start: str) -> LoopParameters:
-    """The usual loop, or the one with the integral time as printed."""
-    return GVK_6_AS_PRINTED if start == PRINTED else loop
+    """The usual loop, or another of the paper's gyro."""
+    return _STARTS[start][1] if start in _STARTS else loop
 
 
 def starts(types: Sequence[TypeView]) -> list[tuple[str, str]]:
     """Loops to start from: value of the address, and in words."""
     return [
         ("", gettext("the paper’s gyro")),
-        (PRINTED, gettext("with T1 as printed")),
+        *((name, gettext(text)) for name, (text, _) in _STARTS.items()),
         *((f"type:{kind.name}", gettext("type %(type)s") % {"type": kind.name}) for kind in types),
     ]
 
@@ -51,7 +56,7 @@ def given(form: Form) -> tuple[dict[str, float], float | None]:
     Raises
     ------
     Invalid
-        With every field that cannot be read.
+        With every field that cannot be read, or holds what no gyro's loop has.
     """
     fields = Fields(form)
     parameters = {
@@ -61,6 +66,8 @@ def given(form: Form) -> tuple[dict[str, float], float | None]:
         for name in MEMBERS
     }
     duration = fields.optional(DURATION, "")
+    read = {name: value for name, value in parameters.items() if not math.isnan(value)}
+    fields.wrong(*problems_of(read, None if duration is None or math.isnan(duration) else duration))
     fields.check()
     return parameters, duration
 

@@ -13,6 +13,7 @@ from app.pages import loop_charts
 from app.plots.theme import Spec
 from app.services.loop import LoopAnswer, drawn_steps
 from app.services.loop_documents import margin_numbers, rows, verdict_message
+from simdevice.dynamics import GVK_6_AS_PRINTED
 
 _STEP_ROWS: Final = 21
 _PER_DECADE: Final = 4
@@ -44,6 +45,7 @@ class LoopView:
     """What the template writes."""
 
     stable: bool
+    misprint: bool
     verdict: str
     gain: str
     nutation: str
@@ -68,6 +70,7 @@ def loop_view(found: LoopAnswer) -> LoopView:
     units = loop_charts.units_of(drawn)
     return LoopView(
         stable=found.stable,
+        misprint=found.parameters == GVK_6_AS_PRINTED,
         verdict=translate(verdict_message(found)),
         gain=figures.significant(found.parameters.gain, 4),
         nutation=figures.significant(found.parameters.nutation, 4),
@@ -92,10 +95,10 @@ def _pole_rows(found: LoopAnswer) -> Iterator[PoleRow]:
     for pole, row in zip(found.poles, rows(found, "poles"), strict=True):
         constant = row["time_constant_s"]
         yield PoleRow(
-            figures.significant(pole.real, 4),
-            figures.significant(pole.imag, 4),
-            figures.significant(row["damping_ratio"], 2),
-            figures.DASH if constant is None else figures.significant(1e3 * constant, 3),
+            _digits(pole.real, 4),
+            _digits(pole.imag, 4),
+            _digits(row["damping_ratio"], 2),
+            figures.DASH if constant is None else _digits(1e3 * constant, 3),
             not pole.real < 0,
             pole == nutation,
         )
@@ -108,19 +111,16 @@ def _margin_rows(found: LoopAnswer) -> Iterator[MarginRow]:
 
     def row(name: str, unit: str, key: str) -> MarginRow:
         values = [side[key] for side in sides]
-        x, y = (
-            gettext("none") if value is None else figures.significant(_shown(key, value), 3)
-            for value in values
-        )
+        x, y = (gettext("none") if value is None else _digits(_shown(key, value), 3) for value in values)
         sizes = [abs(value) if value is not None else math.inf for value in values]
         worse = int(sizes[1] < sizes[0])
         return MarginRow(name, unit, (x, y), None if key in _PLACES else worse)
 
     yield row(gettext("Gain margin"), gettext("dB"), "gain_db")
     yield row(gettext("as a factor"), "", "gain_factor")
-    yield row(gettext("at"), gettext("rad/s"), "gain_at_rad_per_s")
+    yield row(gettext("at frequency"), gettext("rad/s"), "gain_at_rad_per_s")
     yield row(gettext("Phase margin"), "°", "phase_deg")
-    yield row(gettext("at"), gettext("rad/s"), "phase_at_rad_per_s")
+    yield row(gettext("at frequency"), gettext("rad/s"), "phase_at_rad_per_s")
     yield row(gettext("Bandwidth (−3 dB)"), gettext("rad/s"), "bandwidth_rad_per_s")
     yield row(gettext("as a frequency"), gettext("Hz"), "bandwidth_hz")
 
@@ -129,14 +129,20 @@ def _shown(key: str, value: float) -> float:
     return value if key in _PLACES else abs(value)
 
 
+def _digits(value: float | None, digits: int) -> str:
+    """So many significant digits with the zeros at their end; powers of ten where it is very large or small."""
+    decimals = figures.decimals_of(None if value is None else abs(value), digits)
+    if decimals is None or not -2 <= decimals <= 8:
+        return figures.significant(value, digits)
+    return str(figures.figure(value, max(decimals, 0)))
+
+
 def _step_rows(found: LoopAnswer, units: loop_charts.Units) -> Iterator[tuple[str, ...]]:
     every = rows(found, "steps")
     factors = (units.per_s, units.per_rad, units.per_rad, 1.0, 1.0)
     for at in np.unique(np.linspace(0, len(every) - 1, _STEP_ROWS).astype(int)).tolist():
         values = [value or 0.0 for value in every[at].values()]
-        yield tuple(
-            figures.significant(value * factor, 4) for value, factor in zip(values, factors, strict=True)
-        )
+        yield tuple(_digits(value * factor, 4) for value, factor in zip(values, factors, strict=True))
 
 
 def _frequency_rows(found: LoopAnswer) -> Iterator[tuple[str, ...]]:

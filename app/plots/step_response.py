@@ -8,7 +8,7 @@ from app.plots import theme
 from app.plots.template import axis_range, filled, template_of
 from app.plots.theme import Spec
 
-HEIGHT_PX: Final = 240
+HEIGHT_PX: Final = 264
 _DASHES: Final = {"x": [1, 0], "y": [7, 3]}
 Curve = Sequence[tuple[float, float]]
 

@@ -102,7 +102,7 @@ class LoopAnswer:
 
 
 def usual(work: Work, type_name: str | None) -> LoopParameters:
-    """The paper's loop; of a type its scale factor, as far as the type's nominal values give one.
+    """The paper's loop; of a type its scale factor to six digits, as far as its nominal values give one.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def usual(work: Work, type_name: str | None) -> LoopParameters:
         if kind.name == type_name:
             known = [kind.nominals[name].value for name in ("kx", "ky") if name in kind.nominals]
             scale = abs(parameter_si("kx", sum(known) / len(known))) if known else 0.0
-            return replace(GVK_6, torquer_scale=scale) if scale else GVK_6
+            return replace(GVK_6, torquer_scale=float(f"{scale:.6g}")) if scale else GVK_6
     raise NotFound(problem("unknown-type", "There is no type %(name)s.", column="type", name=type_name))
 
 
@@ -127,14 +127,23 @@ def changed(loop: LoopParameters, given: Mapping[str, float]) -> LoopParameters:
     Invalid
         With every value that no gyro's loop has, each at its field.
     """
-    wrong = [item for name, value in given.items() if (item := _problem(name, value))]
-    if wrong:
-        raise Invalid(*wrong)
-    made = replace(loop, **{MEMBERS[name]: value for name, value in given.items()})
-    wrong = [*_beyond_together(made)]
+    wrong = problems_of(given)
+    if not wrong:
+        made = replace(loop, **{MEMBERS[name]: value for name, value in given.items()})
+        wrong = _beyond_together(made)
     if wrong:
         raise Invalid(*wrong)
     return made
+
+
+def problems_of(given: Mapping[str, float], duration: float | None = None) -> list[Problem]:
+    """What is wrong with single parameters, and with the length of the step response in ``duration_s``."""
+    wrong = [item for name, value in given.items() if (item := _problem(name, value))]
+    low, high = DURATIONS
+    if duration is not None and not low <= duration <= high:
+        wrong.append(problem("loop-range", "Give a value from %(low)g to %(high)g.", column="duration_s",
+                             low=low, high=high))  # fmt: skip
+    return wrong
 
 
 def _problem(name: str, value: float) -> Problem | None:
@@ -163,23 +172,17 @@ def _beyond_together(loop: LoopParameters) -> list[Problem]:
     return wrong
 
 
-def check_duration(duration: float | None) -> None:
-    """Refuse a length of the step response that makes no sense.
+@lru_cache(maxsize=32)
+def answer(loop: LoopParameters, duration: float | None = None) -> LoopAnswer:
+    """Everything about a loop; without a duration the step response is as long as it needs.
 
     Raises
     ------
     Invalid
-        At the field ``duration_s``.
+        With a duration that makes no sense.
     """
-    low, high = DURATIONS
-    if duration is not None and not low <= duration <= high:
-        raise Invalid(problem("loop-range", "Give a value from %(low)g to %(high)g.", column="duration_s",
-                              low=low, high=high))  # fmt: skip
-
-
-@lru_cache(maxsize=32)
-def answer(loop: LoopParameters, duration: float | None = None) -> LoopAnswer:
-    """Everything about a loop; without a duration the step response is as long as it needs."""
+    if wrong := problems_of({}, duration):
+        raise Invalid(*wrong)
     dynamics = LoopDynamics(loop)
     settling = settling_time(dynamics, SETTLED) if dynamics.stable else None
     shown = duration or _rounded_up(2.0 * settling if settling else _GROWTHS / _growth(dynamics))
