@@ -45,7 +45,7 @@ class Thresholds:
     false_alarm: float = 1e-6
     noise_factor: float = 2.0
     drift_na: float = 25.0
-    partner_na: float = 40.0
+    partner_na: float = 100.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +125,8 @@ def judged(
     if len(take.t_s) < 2:
         return (_too_short(0.0, thresholds),)
     expected = expected or Expectations()
+    if not np.median(np.diff(take.t_s)) > 0:
+        return (_irregular(int(np.sum(np.diff(take.t_s) <= 0)), 0),)
     findings = list(_time(take.t_s, thresholds))
     channels = {"Jx": take.jx_ma, "Jy": take.jy_ma}
     for name, values in channels.items():
@@ -136,7 +138,7 @@ def judged(
 
 def _time(t_s: Array, thresholds: Thresholds) -> Iterator[Finding]:
     steps = np.diff(t_s)
-    duration, rate = duration_and_rate(t_s) if (np.median(steps) > 0) else (0.0, np.inf)
+    duration, rate = duration_and_rate(t_s)
     irregular = _gap(steps, thresholds.false_alarm)
     if irregular is not None:
         yield irregular
@@ -173,8 +175,6 @@ def _gap(steps: Array, false_alarm: float) -> Finding | None:
     steps' own scatter (see `samples.outlying`), but never more than nine tenths.
     """
     usual = float(np.median(steps))
-    if usual <= 0:
-        return _irregular(int(np.sum(steps <= 0)), 0)
     limit = float(np.clip(largest_step(steps, false_alarm) / usual, 0.5, 0.9))
     wrong = steps[np.abs(steps / usual - 1.0) > limit]
     if not len(wrong):
@@ -199,10 +199,14 @@ def _channel(
     name: str, values: Array, t_s: Array, thresholds: Thresholds, expected: Expectations, largest_ma: float
 ) -> Iterator[Finding]:
     false_alarm = thresholds.false_alarm / 2.0  # two channels
-    saturated = _saturation(name, values, false_alarm, largest_ma)
-    stuck = saturated or _stuck(name, values, false_alarm)
-    if stuck:
-        yield stuck
+    # A channel that rests on one value is stuck even where that is its extreme; but the range's end says more.
+    dead = (
+        _saturation(name, values, int(np.sum(np.abs(values) >= largest_ma * (1.0 - TOLERANCE))))
+        or _stuck(name, longest_run(values, false_alarm))
+        or _saturation(name, values, at_a_limit(values, false_alarm))
+    )
+    if dead:
+        yield dead
         return
     off = outlying(values, false_alarm)
     if off.any():
@@ -223,8 +227,7 @@ def _channel(
     yield from _signal(name, values[~off], t_s[~off], thresholds, expected)
 
 
-def _saturation(name: str, values: Array, false_alarm: float, largest_ma: float) -> Finding | None:
-    count = int(np.sum(np.abs(values) >= largest_ma * (1.0 - TOLERANCE))) or at_a_limit(values, false_alarm)
+def _saturation(name: str, values: Array, count: int) -> Finding | None:
     if not count:
         return None
     return Finding(
@@ -245,8 +248,7 @@ def _saturated_by_flag() -> Finding:
     )
 
 
-def _stuck(name: str, values: Array, false_alarm: float) -> Finding | None:
-    length = longest_run(values, false_alarm)
+def _stuck(name: str, length: int) -> Finding | None:
     if not length:
         return None
     return Finding(

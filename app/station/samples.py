@@ -18,6 +18,7 @@ _NORMAL: Final = 1.482602218505602
 _MAD_ERROR: Final = 1.1664
 """√n times the relative standard deviation of a normal sample's median absolute deviation (Huber, Robust
 Statistics, 1981, 5.1: an efficiency of 36.7 % against the standard deviation's √(1/2n))."""
+_GOLDEN: Final = (5.0**0.5 - 1.0) / 2.0
 _FEW_CODES: Final = 5
 _SHORTEST_RUN: Final = 20
 _RUNS: Final = 5
@@ -34,16 +35,18 @@ def limit_of_noise(values: Array, false_alarm: float) -> float:
     """A distance from the median that no sample of normal noise exceeds but with probability `false_alarm`.
 
     With probability α/2 one of n samples is beyond ±k·σ, Q(k) = α/4n. The standard deviation comes from the median
-    absolute deviation M of the codes; that of the unrounded values is at most M + q. It is underestimated by more
-    than the part k·1.17/√n with a probability below α/2. A code is off by q at most from an unrounded value and
-    median. So the distance is k·1.4826·(M + q)/(1 − k·1.17/√n) + q.
+    absolute deviation, 1.4826·M; it is underestimated by more than the part k·1.17/√n with a probability below α/2.
+    Codes are spread evenly over their step before M is taken, which makes it larger, never smaller; and a code is
+    off by q at most from the unrounded value and median. So the distance is k·1.4826·M/(1 − k·1.17/√n) + q.
     """
     n = len(values)
     k = -float(ndtri(false_alarm / (4.0 * n)))
     step = step_of(values)
+    if step:
+        # Evenly, and the same for the same record: the multiples of the golden ratio, modulo 1.
+        values = values + step * (np.arange(n) * _GOLDEN % 1.0 - 0.5)
     deviation = float(np.median(np.abs(values - np.median(values))))
-    trusted = max(0.5, 1.0 - k * _MAD_ERROR / float(np.sqrt(n)))
-    return k * _NORMAL * (deviation + step) / trusted + step
+    return k * _NORMAL * deviation / _trusted(k, n) + step
 
 
 def outlying(values: Array, false_alarm: float) -> NDArray[np.bool_]:
@@ -56,7 +59,11 @@ def largest_step(steps: Array, false_alarm: float) -> float:
     n = len(steps)
     k = -float(ndtri(false_alarm / (4.0 * n)))
     deviation = float(np.median(np.abs(steps - np.median(steps))))
-    return k * _NORMAL * deviation / max(0.5, 1.0 - k * _MAD_ERROR / float(np.sqrt(n)))
+    return k * _NORMAL * deviation / _trusted(k, n)
+
+
+def _trusted(k: float, n: int) -> float:
+    return max(0.5, 1.0 - k * _MAD_ERROR / float(np.sqrt(n)))
 
 
 def longest_run(values: Array, false_alarm: float) -> int:
@@ -86,8 +93,14 @@ def at_a_limit(values: Array, false_alarm: float) -> int:
 
     Noise has fewer samples at its very extreme than at the value next to it; of m samples at both, more than half
     lie at the extreme with the binomial's probability. Leaping samples are left out, and so are records of a few
-    codes, whose extreme may be where most samples are.
+    codes, whose extreme may be where most samples are. Where the extreme is the median too, the rest lies on one
+    side; noise does that only where it hardly ever leaves two codes.
     """
+    median = np.median(values)
+    for extreme in (values.max(), values.min()):
+        beside_it = values[values != extreme]
+        if extreme == median and len(np.unique(beside_it)) >= _FEW_CODES - 1:
+            return int(np.sum(values == extreme))
     step = step_of(values)
     inner = values[~outlying(values, false_alarm)]
     codes, counts = np.unique(inner, return_counts=True)
