@@ -2,7 +2,9 @@
 
 from typing import Any
 
+from simdevice.ammeter import Ammeter
 from simdevice.bench import Bench
+from simdevice.dynamics import LoopParameters
 from simdevice.interference import aliased
 from simdevice.noise import RateNoise
 from simdevice.thermal import ZERO_CELSIUS, Temperature, WarmUp
@@ -28,13 +30,14 @@ def simulation_facts(bench: Bench, scenario: str) -> dict[str, Any]:
         and {"amplitude_ma": _short(ma_from_ampere(interference.mains)), "hz": interference.mains_frequency},
         "ripple": interference.ripple and _ripple(bench),
         "jitter_s": interference.jitter,
+        "ammeter": _ammeter(bench.ammeter),
+        "loop": None if bench.loop is None else _loop(bench.loop),
         "faults": [
             _fault(str(fault.kind), fault.theta, fault.psi, fault.every) for fault in bench.located_faults
         ],
     }
     on = {name: value for name, value in parts.items() if value}
-    unsteady = {"noise", "warm_up", "temperature"} & set(on)
-    if unsteady:
+    if {"warm_up", "temperature", "loop"} & set(on) or bench.noise.wanders:
         on["timetable"] = {
             "first_s": timetable.first, "move_s": timetable.move, "settle_s": timetable.settle,
         }  # fmt: skip
@@ -82,6 +85,27 @@ def _ripple(bench: Bench) -> dict[str, float]:
         "amplitude_ma": _short(ma_from_ampere(bench.interference.ripple)),
         "hz": _short(hz),
         "seen_at_hz": _short(aliased(hz, bench.rate)),
+    }
+
+
+def _ammeter(ammeter: Ammeter) -> dict[str, float]:
+    """Errors of gain and zero, where there are any."""
+    errors: dict[str, float] = {}
+    for axis, channel in zip("xy", ammeter.channels, strict=True):
+        errors[f"gain_error_{axis}_ppm"] = round((channel.gain - 1.0) * 1e6, _DECIMALS)
+        errors[f"offset_{axis}_ma"] = _short(ma_from_ampere(channel.offset))
+    return {name: value for name, value in errors.items() if value}
+
+
+def _loop(loop: LoopParameters) -> dict[str, float]:
+    return {
+        "angular_momentum_nms": loop.angular_momentum,
+        "inertia_kgm2": loop.inertia,
+        "pickoff_v_per_rad": loop.pickoff_gain,
+        "amplifier_a_per_v": loop.amplifier_gain,
+        "torquer_rad_per_s_a": loop.torquer_scale,
+        "t1_s": loop.integral_time,
+        "t2_s": loop.lag_time,
     }
 
 
