@@ -182,8 +182,10 @@ def sentence(said: Sentence) -> str:
     """
     if LOCALE.get() == "en" or said.template is None or gettext(said.template) == said.template:
         return said.message
+    if not said.values:
+        return said.message if "%(" in said.template else gettext(said.template)
     try:
-        return translate(Message("", said.template, dict(said.values or {})))
+        return translate(Message("", said.template, dict(said.values)))
     except (KeyError, TypeError, ValueError):
         return said.message
 
