@@ -54,15 +54,16 @@ class Slope:
     dof: int
 
 
-def slope(t_s: Array, current_ma: Array) -> Slope:
-    """Slope of the line through readings (n,) at times (n,), n ≥ 3 and not all at one time."""
+def slopes(t_s: Array, currents_ma: Array) -> list[Slope]:
+    """Slopes of the lines through readings (n, m) of m channels at times (n,), n ≥ 3 and not all at one time."""
     centred = t_s - t_s.mean()
-    spread = float(centred @ centred)
-    deviations = current_ma - current_ma.mean()
-    value = float(centred @ deviations) / spread
-    residuals = deviations - value * centred
+    spread = centred @ centred
+    deviations = currents_ma - currents_ma.mean(axis=0)
+    values = centred @ deviations / spread
+    residuals = deviations - centred[:, None] * values
     dof = len(t_s) - 2
-    return Slope(value, float(np.sqrt(residuals @ residuals / dof / spread)), dof)
+    uncertainties = np.sqrt(np.einsum("ij,ij->j", residuals, residuals) / dof / spread)
+    return [Slope(value, u, dof) for value, u in zip(values.tolist(), uncertainties.tolist(), strict=True)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,18 +123,17 @@ class RestWatch:
         return verdict
 
     def _window(self, rows: Array) -> Rest:
-        t_s, jx_ma, jy_ma = rows.T
-        if len(rows) < _FEWEST or t_s[-1] == t_s[0]:
+        if len(rows) < _FEWEST or rows[-1, 0] == rows[0, 0]:
             return Rest(None)
-        x, y = slope(t_s, jx_ma), slope(t_s, jy_ma)
-        verdicts = [self._settled(x), self._settled(y)]
+        x, y = slopes(rows[:, 0], rows[:, 1:])
+        student = float(stdtrit(x.dof, self._rule.confidence))
+        verdicts = [self._settled(channel, student * channel.u) for channel in (x, y)]
         if False in verdicts:
             return Rest(False, x, y)
         return Rest(None if None in verdicts else True, x, y)
 
-    def _settled(self, channel: Slope) -> bool | None:
+    def _settled(self, channel: Slope, margin: float) -> bool | None:
         limit = self._rule.limit_na_per_s / _NA_PER_MA
-        margin = float(stdtrit(channel.dof, self._rule.confidence)) * channel.u
         if abs(channel.value) + margin <= limit:
             return True
         return False if abs(channel.value) - margin > limit else None
