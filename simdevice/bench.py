@@ -193,4 +193,4 @@ def _mean_temperature(bench: Bench, begin: float) -> float | None:
 
 
 def _overloaded(readings: Array, top: float) -> bool:
-    return bool(np.abs(readings).max(initial=0.0) >= top)
+    return bool(np.isfinite(top) and max(readings.max(initial=0.0), -readings.min(initial=0.0)) >= top)

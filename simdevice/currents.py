@@ -53,12 +53,13 @@ class Case:
         """
         bench, parts = self.bench, list[Array]()
         if bench.noise.wanders:
-            rates = slow.wander(bench.noise, bench.seed, bench.start, t)
-            parts.append(np.array(self.gyro.currents_for(rates[0], rates[1])))
+            parts.append(slow.wander(bench.noise, bench.seed, bench.start, t))
         if not bench.warm_up.quiet:
-            drifts = bench.warm_up.drifts(t)
             # More drift is less current: it turns the rotor in the torquers' stead.
-            parts.append(np.array(self.gyro.currents_for(-drifts[0], -drifts[1])))
+            parts.append(-bench.warm_up.drifts(t))
+        rates = total(parts)
+        if rates is not None:
+            parts = [np.array(self.gyro.currents_for(rates[0], rates[1]))]
         if bench.temperature is not None and bench.temperature.sensitivity:
             # Of the gyro without its turn-on offset: parts add up, products of two small ones are left out.
             parts.append(bench.temperature.currents(bench.gyro, self.rate, self.force, t))
@@ -158,10 +159,12 @@ def moving_currents(case: Case, position: Position, begin: float, t: Array) -> A
 
 
 def total(parts: Sequence[Array]) -> Array | None:
-    """Sum of parts in their order; None of none."""
-    result: Array | None = None
-    for part in parts:
-        result = part if result is None else result + part
+    """Sum of parts in their order, in the place of the first; None of none."""
+    if not parts:
+        return None
+    result = parts[0]
+    for part in parts[1:]:
+        result += part
     return result
 
 

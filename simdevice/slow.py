@@ -77,29 +77,25 @@ def wander(noise: RateNoise, seed: int, start: int, t: Array) -> Array:
         Of the measured rates x and y, rad/s.
     """
     place = np.asarray(t, dtype=np.float64) / KNOT
-    if len(place) and not place.min() >= 0:
+    if not len(place):
+        return np.zeros((2, 0))
+    if not place.min() >= 0:
         raise ValueError("There is no noise before power-up: give times that are not negative.")
-    before = np.floor(place).astype(np.int64)
+    before = place.astype(np.int64)
     beyond = place - before
-    rates = np.zeros((2, len(place)))
-    for part, coefficient in (
-        (Part.FLICKER, noise.bias_instability),
-        (Part.RATE_RANDOM_WALK, noise.rate_random_walk),
-    ):
-        if coefficient:
-            for axis, rate in enumerate(rates):
-                rate += coefficient * _between_knots(_axis(part, seed, axis, start), before, beyond)
+    first, last = int(before.min()), int(before.max()) + 2
+    before -= first
+    rates = np.empty((2, len(place)))
+    for axis in range(2):
+        knots = np.zeros(last - first)
+        for part, coefficient in (
+            (Part.FLICKER, noise.bias_instability),
+            (Part.RATE_RANDOM_WALK, noise.rate_random_walk),
+        ):
+            if coefficient:
+                knots += coefficient * _axis(part, seed, axis, start).between(first, last)
+        rates[axis] = knots[before] + beyond * np.diff(knots)[before]
     return rates
-
-
-def _between_knots(axis: "_Axis", before: NDArray[np.int64], beyond: Array) -> Array:
-    values = np.empty(len(before))
-    blocks = before // _BLOCK
-    for block in np.unique(blocks).tolist():
-        here = blocks == block
-        knots, index = axis.knots(block), before[here] - block * _BLOCK
-        values[here] = knots[index] + beyond[here] * (knots[index + 1] - knots[index])
-    return values
 
 
 class _Axis:
@@ -115,6 +111,12 @@ class _Axis:
         self._lock = Lock()
         self._firsts: list[tuple[float, ...]] = [()]  # of every block but the very first, which has none
         self._recent: dict[int, Array] = {}
+
+    def between(self, first: int, last: int) -> Array:
+        """Knots number `first` to `last` - 1."""
+        blocks = range(first // _BLOCK, (last - 1) // _BLOCK + 1)
+        knots = np.concatenate([self.knots(block)[:-1] for block in blocks])
+        return knots[first - blocks[0] * _BLOCK : last - blocks[0] * _BLOCK]
 
     def knots(self, block: int) -> Array:
         """The knots of a block and the first of the next, (_BLOCK + 1,)."""
