@@ -6,6 +6,8 @@ at a time has an instrument: whoever needs several exchanges in a row holds `Ins
 """
 
 import contextlib
+import select
+import socket
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -142,6 +144,7 @@ class Instrument:
                     resource.close()
 
     def _send(self, resource: "MessageBasedResource", text: str) -> None:
+        _require_open(resource)
         resource.write_raw((text + self.connection.write_termination).encode())
 
     def _block(self, resource: "MessageBasedResource", text: str) -> bytes:
@@ -268,6 +271,22 @@ def _manager(library: str) -> "ResourceManager":
 
     with _opening:
         return ResourceManager(library)
+
+
+def _require_open(resource: "MessageBasedResource") -> None:
+    """Notice that the other end has closed: pyvisa-py would wait for its whole timeout, busily, for an answer.
+
+    Raises
+    ------
+    ConnectionError
+        There is nobody at the other end any more.
+    """
+    session = getattr(resource.visalib, "sessions", {}).get(resource.session)
+    stream = getattr(session, "interface", None)
+    if not isinstance(stream, socket.socket) or not select.select([stream], [], [], 0.0)[0]:
+        return
+    if not stream.recv(1, socket.MSG_PEEK):
+        raise ConnectionAbortedError("closed at the other end")
 
 
 def _why(error: Exception) -> str:

@@ -5,7 +5,7 @@ import threading
 import time
 
 import pytest
-from scripted import Cut, Peer
+from scripted import WAITS_S, Cut, Peer
 
 from app.station.contracts import InstrumentLost
 from app.station.visa import Connection, Instrument, Unanswered
@@ -80,6 +80,20 @@ def test_a_connection_cut_in_the_middle_is_lost_and_the_next_use_opens_another(s
         assert instrument.ask_block("DATA?") == b"abc"
         instrument.close()
     assert peer.clients == 2
+
+
+def test_an_instrument_that_went_away_between_two_questions_is_lost_at_once():
+    """And not after the timeout, which is ten seconds."""
+    with Peer((b"*IDN?", Cut(b"Maker\n")), (b"*IDN?", b"Maker\n")) as peer:
+        instrument = of(peer, timeout_s=WAITS_S)
+        assert instrument.ask("*IDN?") == "Maker"
+        time.sleep(0.2)  # until the news has arrived here, from this same machine
+        begun = time.monotonic()
+        with pytest.raises(InstrumentLost, match=r"broke at \*IDN\? \(closed at the other end\)"):
+            instrument.ask("*IDN?")
+        assert time.monotonic() - begun < WAITS_S / 2
+        assert instrument.ask("*IDN?") == "Maker"
+        instrument.close()
 
 
 def test_nobody_there_is_lost():
