@@ -93,6 +93,12 @@ class Bench:
         return self.gyro.shifted({"w0x": x, "w0y": y})
 
     @property
+    def changes(self) -> bool:
+        """Whether currents change with the time since power-up."""
+        warms = self.temperature is not None and bool(self.temperature.sensitivity)
+        return self.noise.wanders or not self.warm_up.quiet or warms
+
+    @property
     def located_faults(self) -> tuple[Fault, ...]:
         """The faults, each with its place."""
         return faults.located(self.faults, self.stand.certificate, self.seed)

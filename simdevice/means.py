@@ -119,7 +119,7 @@ def _expected_currents(
     starts = np.cumsum(lengths) - lengths
     expected: list[list[Array]] = [[], []]
     for row, position in enumerate(positions):
-        slow = case_in(bench, position).slow(bench.begin(position) + t)
+        slow = case_in(bench, position).slow(bench.begin(position) + t) if bench.changes else None
         for number in range(2):
             added = np.zeros(1) if slow is None else np.add.reduceat(slow[number], starts) / lengths
             expected[number].append(steady[number][row] + added)

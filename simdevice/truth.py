@@ -29,6 +29,8 @@ def mean_gyro(bench: Bench, positions: Sequence[Position]) -> Gyro:
         The bench's own, when nothing changes it.
     """
     gyro = bench.gyro_in_this_start
+    if not bench.changes:
+        return gyro
     begins = np.array([bench.begin(position) for position in positions])
     within = (np.arange(_MOMENTS) + 0.5) * (bench.duration / _MOMENTS)
     t = (begins[:, None] + within).ravel()
