@@ -85,6 +85,7 @@ class FleetGyro:
             ammeter,
             self.kind.noise,
             seed=derived_seed(self.seed, Part.SESSION_SEED, session),
+            start=start,
         )
 
 

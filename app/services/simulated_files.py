@@ -1,12 +1,14 @@
 """A simulated session as files: what `driftbook simulate` writes."""
 
 import json
-from typing import Final
+from collections.abc import Sequence
+from typing import Any, Final
 
 from app.exchange.json_values import dumps
 from app.exchange.record_places import record_name
-from app.exchange.rows import Facts
+from app.exchange.rows import CurrentRecord, Facts
 from app.exchange.session_folder import TRUTH
+from app.exchange.session_json import FILE_NAME
 from app.exchange.session_writing import RecordFormat, session_files
 from app.services.simulated import certificate_lab, common_lab, records_lab, truth_values
 from simdevice.bench import SimulatedSession
@@ -30,6 +32,7 @@ def simulated_files(session: SimulatedSession, facts: Facts, record_format: Reco
         truth=truth_values(session.truth),
         record_format=record_format,
     )
+    files[FILE_NAME] = _text(_with_temperatures(json.loads(files[FILE_NAME]), records))
     files[TRUTH] = _text(json.loads(files[TRUTH]) | (facts.further or {}))
     for record, item in zip(records, session.positions, strict=True):
         if Kind.INTERRUPTED in item.faults:
@@ -39,6 +42,14 @@ def simulated_files(session: SimulatedSession, facts: Facts, record_format: Reco
     if common:
         files[UNCERTAINTIES] = _text(common)
     return files
+
+
+def _with_temperatures(description: dict[str, Any], records: Sequence[CurrentRecord]) -> dict[str, Any]:
+    """`session.json` with each record's temperature, which a CSV file has no place for."""
+    for entry, record in zip(description.get("positions", []), records, strict=True):
+        if record.temperature_c is not None:
+            entry["temperature_c"] = record.temperature_c
+    return description
 
 
 def cut_short(data: bytes, record_format: RecordFormat) -> bytes:

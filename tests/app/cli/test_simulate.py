@@ -114,6 +114,17 @@ def test_parts_with_a_mean_change_the_truth(tmp_path, driftbook, plain):
     assert "temperature_c" not in content(plain, "session.json")
 
 
+def test_each_record_has_its_temperature(tmp_path, driftbook):
+    folder = tmp_path / "made"
+    assert (
+        driftbook("simulate", "--out", folder, *SHORT, "--temperature", "20/36", "--since-power-up", 100).code
+        == 0
+    )
+    # 36 K/h is 0.01 K/s; records of 2 s begin every 17 s.
+    listed = [item["temperature_c"] for item in content(folder, "session.json")["positions"]]
+    assert listed == pytest.approx([21.01, 21.18, 21.35, 21.52], abs=1e-9)
+
+
 def test_equal_commands_give_equal_bytes(tmp_path, driftbook):
     options = ("--scenario", "full-noise", "--fault", "spike", "--fault", "interrupted@0/90", *SHORT)
     for name in ("a", "b"):
