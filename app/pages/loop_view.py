@@ -12,7 +12,7 @@ from app.i18n import gettext, translate
 from app.pages import loop_charts
 from app.plots.theme import Spec
 from app.services.loop import LoopAnswer, drawn_steps
-from app.services.loop_documents import margin_numbers, rows, verdict_message
+from app.services.loop_documents import COLUMNS, margin_numbers, rows, verdict_message
 from simdevice.dynamics import GVK_6_AS_PRINTED
 
 _STEP_ROWS: Final = 21
@@ -138,11 +138,21 @@ def _digits(value: float | None, digits: int) -> str:
 
 
 def _step_rows(found: LoopAnswer, units: loop_charts.Units) -> Iterator[tuple[str, ...]]:
+    """Some of the times; time, both angles, both rates down to the fourth digit of their largest value."""
     every = rows(found, "steps")
+    chosen = np.unique(np.linspace(0, len(every) - 1, _STEP_ROWS).astype(int)).tolist()
     factors = (units.per_s, units.per_rad, units.per_rad, 1.0, 1.0)
-    for at in np.unique(np.linspace(0, len(every) - 1, _STEP_ROWS).astype(int)).tolist():
-        values = [value or 0.0 for value in every[at].values()]
-        yield tuple(_digits(value * factor, 4) for value, factor in zip(values, factors, strict=True))
+    columns = [
+        [factor * (every[at][name] or 0.0) for at in chosen]
+        for name, factor in zip(COLUMNS["steps"], factors, strict=True)
+    ]
+    time, alpha, beta, x, y = (max(map(abs, column)) for column in columns)
+    peaks = (time, *[max(alpha, beta)] * 2, *[max(x, y)] * 2)
+    places = [figures.decimals_of(peak, 4) or 0 for peak in peaks]
+    for values in zip(*columns, strict=True):
+        yield tuple(
+            str(figures.figure(value, max(place, 0))) for value, place in zip(values, places, strict=True)
+        )
 
 
 def _frequency_rows(found: LoopAnswer) -> Iterator[tuple[str, ...]]:
