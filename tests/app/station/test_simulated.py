@@ -1,5 +1,6 @@
 """The drivers and `simulated.toml` on the simulated instruments, over real sockets."""
 
+import threading
 from dataclasses import replace
 
 import numpy as np
@@ -136,3 +137,33 @@ def test_a_refused_question_is_told_in_the_instruments_words_not_as_silence():
             ammeter.fetch(0, 10)
         assert ammeter.status().label == 0
         ammeter.close()
+
+
+def test_threads_may_look_at_once():
+    """Four threads, each with its own questions to both instruments: no answer goes astray."""
+    with wired() as found:
+        found.stand.home()
+        found.at_rest()
+        found.stand.move(Place(90.0, 180.0))
+        found.at_rest()
+        wrong: list[object] = []
+
+        def look() -> None:
+            try:
+                for _ in range(20):
+                    status = found.stand.status()
+                    if apart_deg(status.place, Place(90.0, 180.0)) > 0.02 or status.moving:
+                        wrong.append(status)
+                    if found.ammeter.status().running:
+                        wrong.append("running")
+                    if not 0.0 < abs(found.ammeter.reading().jx_ma) < 0.05:
+                        wrong.append("reading")
+            except Exception as error:  # a thread's exception would go unseen
+                wrong.append(error)
+
+        threads = [threading.Thread(target=look) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert not wrong

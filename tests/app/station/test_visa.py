@@ -1,6 +1,8 @@
 """Bytes on the wire, and every way in which a connection breaks."""
 
 import socket
+import subprocess
+import sys
 import threading
 import time
 
@@ -159,3 +161,9 @@ def test_threads_do_not_mix_their_answers():
         instrument.close()
         peer.join()
     assert not wrong
+
+
+def test_the_library_is_imported_only_when_an_instrument_is_used():
+    """It takes half a second, which a command that only describes or solves shall not wait for."""
+    script = "import sys, app.station.instruments; sys.exit('pyvisa' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
