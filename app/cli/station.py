@@ -15,11 +15,12 @@ from app.errors import AppError
 from app.exchange.planned import listed_positions
 from app.station import runs
 from app.station.clock import Clock
-from app.station.contracts import Place
+from app.station.contracts import EmergencyStop, InstrumentFault, InstrumentLost, Place
 from app.station.controls import Controls, StopAsked
 from app.station.description import StationFile, station_file
+from app.station.durable import SpoolFailed
 from app.station.entries import Acquiring, Entry, Judged, Planned, Sent, Warmed
-from app.station.finishing import named
+from app.station.finishing import NotFinished, named
 from app.station.history import History
 from app.station.instruments import open_ammeter, open_stand
 from app.station.preparing import SIXTEEN
@@ -28,6 +29,9 @@ from app.station.running import Orders, live_through
 station = typer.Typer(
     help="Drive a stand and an ammeter through the automated cycle.", pretty_exceptions_enable=False
 )
+
+_BEYOND_CHANCE = 1e-4
+"""Of the fit's χ²: one good session in ten thousand is looked at in vain."""
 
 Config = Annotated[Path, typer.Option("--config", help="TOML file that describes the instruments.")]
 StandAddress = Annotated[
@@ -83,7 +87,7 @@ def run(
 ) -> None:  # fmt: skip
     """Measure a gyro in all positions and have it calibrated; the same command goes on with an unfinished run.
 
-    Ctrl-C ends it and keeps everything. Exit code 0: all positions measured and the calibration is there.
+    Ctrl-C ends it and keeps everything. Exit code 0: all positions are measured and the calibration fits them.
     """
     described = station_file(config, stand_address=stand_address, ammeter_address=ammeter_address)
     orders = Orders(
@@ -105,8 +109,11 @@ def _lived(orders: Orders, described: StationFile, folder: Path, clock: Clock, c
         with controls.on_signals():
             return live_through(orders, described, folder, clock, controls, _Teller().tell)
     except StopAsked as stopped:
-        typer.echo(f"driftbook: stopped by {stopped.why}. The same command goes on with {folder}.", err=True)
-        raise typer.Exit(1) from None
+        why = f"Stopped by {stopped.why}."
+    except (NotFinished, InstrumentFault, InstrumentLost, EmergencyStop, SpoolFailed) as ended:
+        why = ended.problems[0].text
+    typer.echo(f"driftbook: {why} The same command goes on with {folder}.", err=True)
+    raise typer.Exit(1)
 
 
 def _listen_to_keyboard(controls: Controls) -> None:
@@ -166,16 +173,28 @@ def _line(entry: Entry, history: History) -> str | None:
 
 def _verdict(orders: Orders, history: History) -> None:
     """Print the calibration and what it lacks; say by the exit code whether all is well."""
-    reasons = history.finished.reasons if history.finished else ()
-    if history.result is not None:
-        with orders.service() as service:
-            print_result(f"{orders.gyro} on {orders.stand}", service.calibration(history.result))
-            typer.echo(service.page(history.result))
-    for reason in reasons:
+    for reason in history.finished.reasons if history.finished else ():
         typer.echo(f"driftbook: {reason.text}", err=True)
     if history.result is None:
         typer.echo("driftbook: No calibration was asked for. Measure these positions again.", err=True)
         raise typer.Exit(1)
+    with orders.service() as service:
+        result = service.calibration(history.result)
+        print_result(f"{orders.gyro} on {orders.stand}", result)
+        typer.echo(service.page(history.result))
+    if _contradicted(result["least-squares"] if result["method"] == "both" else result):
+        typer.echo(
+            "driftbook: The currents do not fit together as the currents of one gyro on this stand. Do not use the "
+            "result before somebody has found out why.",
+            err=True,
+        )
+        raise typer.Exit(1)
+
+
+def _contradicted(answer: dict[str, Any]) -> bool:
+    """Whether the fit itself says that something is wrong: a blunder found, or residuals beyond all chance."""
+    p_value = answer["fit"]["p_value"]
+    return bool(answer["diagnosis"]) or (p_value is not None and p_value < _BEYOND_CHANCE)
 
 
 @station.command()

@@ -132,7 +132,7 @@ class Cycle:
         at.live.turn_to("warming")
         still, deadline = at.judge.warming(), at.clock.deadline(at.patience.warm_up_s)
         while True:
-            at.look()
+            at.watch()
             currents = at.ammeter.reading()
             warm = still.add(at.clock.lab_s(), currents)
             at.live.show(currents=currents, settled=warm)

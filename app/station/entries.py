@@ -112,7 +112,7 @@ class Warmed:
 
 @dataclass(frozen=True, slots=True)
 class Started:
-    """The cycle turns to a target, to move there, settle and acquire; `take` counts its judged measurements."""
+    """The cycle turns to a target, to move there, settle and acquire; `take` counts what was judged at the place."""
 
     attempt: int
     target: Target

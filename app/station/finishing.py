@@ -89,14 +89,10 @@ class Finishing:
             raise
 
     def _reasons(self) -> Iterator[Message]:
-        history = self.at.history
-        for target in missing(history):
-            for said in self._why(target):
-                yield Message(
-                    "position-missing",
-                    "%(place)s is not in the session: %(why)s",
-                    {"place": named(target), "why": said.text},
-                )
+        for target in missing(self.at.history):
+            why = " ".join(dict.fromkeys(said.text for said in self._why(target)))
+            yield Message("position-missing", "%(place)s is not in the session: %(why)s",
+                          {"place": named(target), "why": why})  # fmt: skip
 
     def _why(self, target: Target) -> Iterator[Said]:
         standing = self.at.history.standing(target)

@@ -209,6 +209,10 @@ class History:
         """The judged takes of a target, in order."""
         return [item for item in self.attempts if item.judged is not None and item.target == target]
 
+    def takes_at(self, place: Place) -> int:
+        """How often a place has been measured, as the first record or the closing one."""
+        return sum(item.judged is not None and item.target.place == place for item in self.attempts)
+
     def standing(self, target: Target) -> Attempt | None:
         """The take that counts: the last one."""
         takes = self.takes(target)

@@ -25,18 +25,16 @@ class Journal:
     def __init__(self, path: Path) -> None:
         self.entries, good = read_journal(path)
         self._stream = durable.open_to_append(path, good)
-        self._broken = False
+        self._broken: BaseException | None = None
 
     def append(self, entry: dict[str, Any]) -> None:
         """Add an entry; when this returns it is on the disk."""
-        if self._broken:  # a torn line must stay the last one
-            raise SpoolFailed(
-                problem("journal-broken", "The journal could not be written; start the station again.")
-            )
+        if self._broken is not None:  # a torn line must stay the last one
+            raise _closed(self._broken)
         try:
             durable.append(self._stream, encoded(entry))
-        except BaseException:
-            self._broken = True
+        except BaseException as error:
+            self._broken = error
             raise
 
     def close(self) -> None:
@@ -86,6 +84,15 @@ def _decoded(line: bytes) -> dict[str, Any] | None:
         return None
     entry: dict[str, Any] = json.loads(body)
     return entry
+
+
+def _closed(why: BaseException) -> SpoolFailed:
+    """What keeps a journal from being written any more, for whoever comes after the one who met it."""
+    if isinstance(why, SpoolFailed):
+        return SpoolFailed(*why.problems)
+    return SpoolFailed(
+        problem("journal-closed", "The journal could not be written; start the same command again.")
+    )
 
 
 def _damaged(path: Path, line: int) -> SpoolFailed:

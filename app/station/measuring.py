@@ -53,7 +53,7 @@ def measure(at: Workplace, target: Target) -> None:
 
 def _begin(at: Workplace, target: Target) -> Attempt:
     number = len(at.history.attempts)
-    at.spool.add(Started(number, target, take=len(at.history.takes(target))))
+    at.spool.add(Started(number, target, at.history.takes_at(target.place)))
     return at.history.attempts[number]
 
 
@@ -68,9 +68,9 @@ def approach(at: Workplace, attempt: Attempt) -> None:
 
 
 def _away(at: Workplace, target: Target) -> Place | None:
-    """The place measured last, other than the target's own."""
-    others = [item.target.place for item in at.history.attempts if item.target.place != target.place]
-    return others[-1] if others else None
+    """The last place but the target's own that the stand did reach."""
+    reached = (item.target.place for item in reversed(at.history.attempts) if item.acquiring is not None)
+    return next((place for place in reached if place != target.place), None)
 
 
 def go(at: Workplace, place: Place, target: Target | None = None, take: int = 0) -> None:
@@ -146,7 +146,7 @@ def settle(at: Workplace, target: Target | None = None, take: int = 0) -> None:
     still = at.judge.settling()
     deadline = at.clock.deadline(at.patience.settle_s)
     while True:
-        at.look()
+        at.watch()
         currents = at.ammeter.reading()
         settled = still.add(at.clock.lab_s(), currents)
         at.live.show(currents=currents, settled=settled)
@@ -199,7 +199,7 @@ def _collect(at: Workplace, attempt: Attempt, blocks: BlockFile) -> bool:
         if acquired.label not in (None, acquiring.label) or acquired.samples < blocks.samples:
             _give_up(at, attempt, _FORGOTTEN)
         overload = acquired.overload
-        _require_at(at, at.look(), attempt.target.place)
+        _require_at(at, at.watch(), attempt.target.place)
         ready = min(acquired.samples, begun.samples) - blocks.samples
         if ready >= at.block_samples or (ready and not acquired.running):
             _fetch(at, blocks, min(ready, at.block_samples))

@@ -2,12 +2,13 @@
 
 import uuid
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 from app.station import runs
+from app.station.ammeter import DescribedAmmeter
 from app.station.clock import Clock
 from app.station.contracts import Place
 from app.station.controls import Controls
@@ -24,6 +25,7 @@ from app.station.preparing import Memory, Preparing
 from app.station.reporting import PATIENCE_S, Reporter
 from app.station.service import Service
 from app.station.spool import Spool
+from app.station.stand import DescribedStand
 from app.station.workplace import Patience, Workplace
 
 
@@ -87,8 +89,10 @@ def live_through(
     with Spool(folder, told) as spool:
         _begin(spool, orders, described)
         live = Live()
-        with _helpers(orders, spool, live, controls) as (forwarder, reporter):
-            at = _workplace(described, spool, clock, controls, live)
+        with ExitStack() as instruments, _helpers(orders, spool, live, controls) as (forwarder, reporter):
+            stand = instruments.enter_context(closing(open_stand(described.stand)))
+            ammeter = instruments.enter_context(closing(open_ammeter(described.ammeter)))
+            at = _workplace(described, spool, stand, ammeter, clock, controls, live)
             at.helpers = (forwarder, reporter)
             preparing = Preparing(
                 spool,
@@ -131,20 +135,28 @@ def _helpers(
 
 
 def _workplace(
-    described: StationFile, spool: Spool, clock: Clock, controls: Controls, live: Live
+    described: StationFile,
+    spool: Spool,
+    stand: DescribedStand,
+    ammeter: DescribedAmmeter,
+    clock: Clock,
+    controls: Controls,
+    live: Live,
 ) -> Workplace:
-    stand, ammeter = described.stand, described.ammeter
     return Workplace(
         spool=spool,
-        stand=open_stand(stand),
-        ammeter=open_ammeter(ammeter),
-        judge=Rules(described.settling, described.warm_up, described.checks, described.types, ammeter.largest_ma),
+        stand=stand,
+        ammeter=ammeter,
+        judge=Rules(
+            described.settling, described.warm_up, described.checks, described.types, described.ammeter.largest_ma
+        ),
         clock=clock,
         controls=controls,
         live=live,
         patience=Patience(
-            stand.homing_s, stand.moving_s, described.settling.allowed_s, described.warm_up.allowed_s
+            described.stand.homing_s, described.stand.moving_s, described.settling.allowed_s,
+            described.warm_up.allowed_s,
         ),
-        at_place_deg=stand.arrival_deg,
+        at_place_deg=described.stand.arrival_deg,
         block_samples=round(described.recording.block_samples),
     )  # fmt: skip

@@ -24,11 +24,11 @@ def samples(content: bytes) -> np.ndarray:
 
 def test_every_position_is_measured_once_and_the_first_again(room):
     history = room.run()
-    assert room.ammeter.starts == [*((place, 0) for place in PLACES), (PLACES[0], 0)]
+    assert room.ammeter.starts == [*((place, 0) for place in PLACES), (PLACES[0], 1)]
     assert list(room.service.records) == [*(Target(*place) for place in PLACES), CLOSING]
     for target, contents in room.service.records.items():
         assert len(contents) == 1
-        np.testing.assert_array_equal(samples(contents[0]), true_record(target.place, 0))
+        np.testing.assert_array_equal(samples(contents[0]), true_record(target.place, target.repeat))
     assert history.result == "/api/v1/calibrations/7"
     assert history.finished.reasons == ()
 

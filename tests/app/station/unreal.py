@@ -13,7 +13,7 @@ from app.station.clock import Clock
 from app.station.contracts import Acquisition, Block, Currents, Place, StandStatus
 from app.station.controls import Controls
 from app.station.cycle import Cycle
-from app.station.entries import Begun, Finding, Said, Target
+from app.station.entries import Begun, Finding, Resumed, Said, Target
 from app.station.finishing import Finishing
 from app.station.forwarding import Forwarder
 from app.station.history import Attempt, History
@@ -152,6 +152,8 @@ class UnrealService:
     records: dict[Target, list[bytes]] = field(default_factory=dict)
     puts: int = 0
     jobs: int = 0
+    solved: set[tuple[tuple[Target, bytes], ...]] = field(default_factory=set)
+    """Inputs of the results: those computed again from the same records are the same result, as at the service."""
     places: tuple[Place, ...] = PLACES
     trouble: list[Unreachable | ServerRefused] = field(default_factory=list)
 
@@ -180,6 +182,7 @@ class UnrealService:
     def calibrate(self, session: int, method: str) -> str:
         self._answer()
         self.jobs += 1
+        self.solved.add(tuple((target, kept[-1]) for target, kept in sorted(self.records.items())))
         return f"job-{self.jobs}"
 
     def job(self, job: str) -> dict[str, object]:
@@ -210,6 +213,7 @@ class Room:
         with Spool(self.folder) as spool:
             if spool.history.begun is None:
                 spool.add(Begun("run-1", "0417", "S1", datetime(2026, 3, 1, 9, tzinfo=UTC), SAMPLES, RATE_HZ))
+            spool.add(Resumed())
             forwarder = Forwarder(spool, self.service.connect, first_pause_s=0.001)
             at = Workplace(
                 spool, self.stand, self.ammeter, self.judge, Clock(speed=1e6, poll_s=0.0), self.controls,
