@@ -65,7 +65,7 @@ def add(body: NewSession, caller: Uploader, response: Response, key: Key = None)
     with caller.write() as work:
         before = idempotency.made_before(work, key, asked)
         if before is None:
-            made = sessions.open_session(work, sessions.NewSession(**body.model_dump()))
+            made = sessions.open_session(work, sessions.NewSession(**body.model_dump(), origin="api"))
             idempotency.remember(work, key, asked, str(made.id))
         else:
             made, response.status_code = sessions.session(work, int(before)), 200

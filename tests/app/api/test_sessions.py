@@ -12,6 +12,7 @@ def test_a_session_takes_the_valid_certificate(stand: httpx.Client) -> None:
     session = made.json()
     assert made.headers["location"] == f"/api/v1/sessions/{session['id']}"
     assert (session["certificate"], session["latitude_deg"], session["start"]) == ("C-17", 55.7558, 1)
+    assert session["origin"] == "api"
     assert (session["state"], session["positions_measured"], session["positions_total"]) == (
         "measuring",
         0,
