@@ -3,10 +3,12 @@
 import asyncio
 import signal
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
+from threading import Event
 from typing import Annotated
 
 import typer
@@ -92,20 +94,28 @@ def serve(
 
 
 async def _serve(instruments: Sequence[Instrument], host: str, ports: Sequence[int]) -> None:
-    stop = False
+    with _asked_to_stop() as stop:
+        async with listening(instruments, host, ports) as bound:
+            stand, ammeter = (f"TCPIP0::{host}::{port}::SOCKET" for port in bound)
+            typer.echo(f"listening: stand {stand} ammeter {ammeter}")
+            while not stop.is_set():
+                await asyncio.sleep(_STOP_WAITS_S)
 
-    def end(*_: object) -> None:
-        nonlocal stop
-        stop = True
 
-    for name in _STOP_SIGNALS:
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), end)
-    async with listening(instruments, host, ports) as bound:
-        stand, ammeter = (f"TCPIP0::{host}::{port}::SOCKET" for port in bound)
-        typer.echo(f"listening: stand {stand} ammeter {ammeter}")
-        while not stop:
-            await asyncio.sleep(_STOP_WAITS_S)
+@contextmanager
+def _asked_to_stop() -> Iterator[Event]:
+    """An event that the system's signals set within the block."""
+    stop = Event()
+    before = {
+        number: signal.signal(number, lambda *_: stop.set())
+        for number in (getattr(signal, name, None) for name in _STOP_SIGNALS)
+        if number is not None
+    }
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _bench(name: str, seed: int, latitude: float | None, rate: float, duration: float) -> Bench:

@@ -8,6 +8,8 @@ import sys
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 
+import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 READY = re.compile(
@@ -76,6 +78,21 @@ def test_a_restarted_process_measures_the_same():
     assert found[0] == found[1]
 
 
+def test_a_record_is_that_of_a_session_simulated_with_the_same_words(tmp_path, driftbook):
+    same = ("--scenario", "full-noise", "--seed", "5", "--duration", "3", "--rate", "100")
+    assert driftbook("simulate", "--out", tmp_path / "day", "--format", "parquet", *same).code == 0
+    (file,) = (tmp_path / "day").rglob("*090_psi180*.parquet")
+    with serving(*same) as (_, stand, ammeter):
+        assert told(stand, "AXIS:HOME;*OPC?", "AXIS:POS 90,180;*OPC?") == ["1", "1"]
+        assert told(ammeter, "INIT;*OPC?;:ACQ:STAT?") == ["1;DONE,0,300,0"]
+        served = np.frombuffer(block(ammeter, 0, 300), "<f8").reshape(-1, 4)
+    table = pq.read_table(file)
+    # Ampere and milliampere: one rounding.
+    for column, name in ((2, "jx_ma"), (3, "jy_ma")):
+        np.testing.assert_allclose(served[:, column] * 1e3, table[name].to_numpy(), rtol=1e-15)
+    np.testing.assert_array_equal(served[:, 1], table["t_s"].to_numpy())
+
+
 def test_a_fault_on_request():
     with serving("--fault", "lost-reference@0/90", "--fault", "spike") as (_, stand, _):
         assert told(stand, "AXIS:HOME;*OPC?;REF?", "AXIS:POS 0,90;*OPC?;REF?") == ["1;1", "1;0"]
@@ -111,10 +128,12 @@ def test_what_cannot_be_served_is_said(driftbook, arguments, said):
     assert outcome.out == ""
 
 
-def test_two_instruments_on_one_port_are_refused(driftbook):
+def test_a_port_that_is_taken_is_said_and_signals_mean_what_they_meant(driftbook):
+    before = signal.getsignal(signal.SIGINT)
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         outcome = driftbook("simdevice", "serve", *BRIEF, "--ammeter-port", taken.getsockname()[1])
     assert outcome.code == 2
     assert "--ammeter-port" in outcome.err
+    assert signal.getsignal(signal.SIGINT) is before
