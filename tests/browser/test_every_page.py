@@ -10,6 +10,7 @@ PAGES = [
     "/gyros/0423", "/gyros/0417/edit", "/types/GVK-6", "/stands", "/stands/S1", "/stands/S1/uncertainty", "/stands/new",
     "/stands/S1/plan?nominal=type:GVK-6", "/stands/S1/plan?mode=propose&grid_deg=45", "/stands/S1/plan?view=trade",
     "/certificates", "/certificates/S1/C-17", "/certificates/new", "/simulations/new", "/method", "/validation",
+    "/loop", "/loop?start=printed",
     "/no-such-page", "/api/v1/docs",
 ]  # fmt: skip
 WAYS = {

@@ -15,6 +15,7 @@ READABLE = [
     "/", "/gyros", "/types/GVK-6", "/stands", "/stands/S1", "/stands/S1/uncertainty", "/certificates",
     "/stands/S1/plan", "/stands/S1/plan?mode=propose", "/stands/S1/plan?view=counts", "/stands/S1/plan?view=trade",
     "/certificates/S1/C-17", "/method", "/validation", "/sessions", "/results", "/gyros/0417",
+    "/loop", "/loop?start=printed",
 ]  # fmt: skip
 WRITABLE = [
     "/sessions/new",
