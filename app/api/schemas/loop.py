@@ -12,9 +12,9 @@ Parameter = Annotated[float | None, Field(ge=0, allow_inf_nan=True)]
 class LoopQuery(Incoming):
     """A loop: the paper's, with everything else that is given in place of it."""
 
-    type: Annotated[
-        OptionalText, Field(description="A type of gyro, whose nominal scale factor is Km.", max_length=100)
-    ] = None
+    type: Annotated[OptionalText, Field(description="A type of gyro, whose nominal scale factor is Km.")] = (
+        None
+    )
     h_n_m_s: Annotated[Parameter, Field(description="H, angular momentum; 0.0014 without it.")] = None
     a_kg_m2: Annotated[Parameter, Field(description="A, equatorial moment of inertia; 5e-7.")] = None
     k_alpha_v_per_rad: Annotated[Parameter, Field(description="Kα, pickoff; 6.")] = None

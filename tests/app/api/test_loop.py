@@ -15,6 +15,7 @@ def test_the_paper_s_loop_needs_no_word(stand: httpx.Client) -> None:
     assert found["stable"] is True
     assert found["verdict"]["code"] == "stable"
     assert found["parameters"]["t1_s"] == 0.015
+    assert stand.get("/loop?type=").json() == found  # an empty part of a query is none
     poles = [complex(item["re_per_s"], item["im_rad_per_s"]) for item in found["poles"]]
     assert poles == list(LoopDynamics(GVK_6).poles)  # every bit
     assert found["margins"]["worse"]["gain_db"] == pytest.approx(16.16, abs=0.01)
