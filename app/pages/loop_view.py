@@ -165,8 +165,8 @@ def _frequency_rows(found: LoopAnswer) -> Iterator[tuple[str, ...]]:
             continue
         shown = omega
         cells = [
-            figures.significant(by_omega[sign * omega][name], 3)
+            str(figures.figure(by_omega[sign * omega][name], 1))
             for name in ("loop_gain_db", "loop_phase_deg", "rate_gain_db")
             for sign in (1, -1)
         ]
-        yield (figures.significant(omega, 3), *cells)
+        yield (figures.plain(float(f"{omega:.3g}")), *cells)
