@@ -50,7 +50,7 @@ async def events(
 ) -> AsyncIterator[ServerSentEvent]:
     """A `job` event with the job itself whenever it has changed; `end` after the last one."""
     (caller, job), seen = watched, last_event_id
-    while True:
+    while not caller.lab.stopping:
         mark = _mark(job)
         if mark != seen:
             yield ServerSentEvent(data=job, event="job", id=mark)

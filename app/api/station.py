@@ -62,7 +62,7 @@ async def events(
 ) -> AsyncIterator[ServerSentEvent]:
     """A `station` event with the whole state whenever it has changed; `end` when the run has ended."""
     (caller, now), seen = watched, last_event_id
-    while True:
+    while not caller.lab.stopping:
         mark = await run_in_threadpool(_mark, caller, now.session)
         if mark != seen:
             now = await run_in_threadpool(_now, caller, now.session)

@@ -12,6 +12,7 @@ import uvicorn
 from app.cli.options import Data, settings
 from app.errors import Conflict, problem
 from app.main import create_app, working_lab
+from app.services.lab import Lab
 from app.services.opening import open_lab
 from app.settings import Settings
 
@@ -46,14 +47,15 @@ def run(lab_settings: Settings, listening: socket.socket, ready: Callable[[str],
         config = uvicorn.Config(
             app, log_config=None, timeout_graceful_shutdown=_GRACE_S, access_log=False, ws="none"
         )
-        _Announcing(config, lambda: ready(url)).run(sockets=[listening])
+        _Server(config, lab, lambda: ready(url)).run(sockets=[listening])
 
 
-class _Announcing(uvicorn.Server):
-    """Tells when it answers, and not before."""
+class _Server(uvicorn.Server):
+    """Tells when it answers, and not before; and tells streams of events when it is about to end."""
 
-    def __init__(self, config: uvicorn.Config, ready: Callable[[], None]) -> None:
+    def __init__(self, config: uvicorn.Config, lab: Lab, ready: Callable[[], None]) -> None:
         super().__init__(config)
+        self._lab = lab
         self._ready = ready
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
@@ -61,6 +63,11 @@ class _Announcing(uvicorn.Server):
         await super().startup(sockets)
         if self.started:
             self._ready()
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Let the streams end, then wait for what is being answered."""
+        self._lab.stopping = True
+        await super().shutdown(sockets)
 
 
 def listen(host: str, port: int) -> socket.socket:

@@ -54,7 +54,7 @@ async def events(person: Reader, lab: TheLab, found: Found) -> AsyncIterator[Ser
     job, session = found
     shown: JobView | None = None
     shown_at = 0.0
-    while True:
+    while not lab.stopping:
         if shown is None or job.state != shown.state:
             yield ServerSentEvent(raw_data=job_mark(job).word, event="said")
         grown = job.state == "running" and monotonic() - shown_at >= _AGES_EVERY_S
@@ -63,10 +63,10 @@ async def events(person: Reader, lab: TheLab, found: Found) -> AsyncIterator[Ser
             yield ServerSentEvent(raw_data=html, event="state")
             shown, shown_at = job, monotonic()
         if job.ended:
+            yield ServerSentEvent(raw_data="", event="end")
             break
         await asyncio.sleep(_LOOK_EVERY_S)
         job, session = await run_in_threadpool(_look, lab, person, job.id)
-    yield ServerSentEvent(raw_data="", event="end")
 
 
 @router.post("/jobs/{job_id}/cancel")

@@ -117,28 +117,32 @@ def _asked(form: Form) -> tuple[CommandKind, tuple[float | None, float | None]]:
 
 @router.get("/sessions/{session_id}/live/events", response_class=EventSourceResponse)
 async def events(
-    person: Reader, lab: TheLab, session_id: int, numbers: Counted
+    person: Reader, lab: TheLab, session_id: int, numbers: Counted, ended: bool | None = None
 ) -> AsyncIterator[ServerSentEvent]:
     """The page's parts as they change.
 
-    ``said`` is how the run stands in words, for a screen reader, when that changes; ``chart-x`` and
-    ``chart-y`` are what is new for the charts; ``end``: nothing more comes.
+    `ended` says of which kind of run the page was made: the part to stop it is sent only when that has
+    changed, so that what somebody reads there does not close. ``said`` is how the run stands in words,
+    for a screen reader, when that changes; ``chart-x`` and ``chart-y`` are what is new for the charts;
+    ``end``: nothing more comes.
     """
     shown: dict[str, str] = {}
     mark, shown_at = "", 0.0
-    while True:
+    while not lab.stopping:
         newest = await run_in_threadpool(_mark, lab, person, session_id)
         if newest != mark or monotonic() - shown_at >= _AGES_EVERY_S:
             mark, shown_at = newest, monotonic()
             seen = await run_in_threadpool(look, lab, person, session_id, numbers)
+            if seen and not shown and ended == seen.run.ended:
+                shown["stop"] = dict(_parts(seen, person))["stop"]
             for name, data in _parts(seen, person) if seen else ():
                 if shown.get(name) != data:
                     shown[name] = data
                     yield ServerSentEvent(raw_data=data, event=name)
             if seen and seen.run.phase == "finished":
+                yield ServerSentEvent(raw_data="", event="end")
                 break
         await asyncio.sleep(_LOOK_EVERY_S)
-    yield ServerSentEvent(raw_data="", event="end")
 
 
 def _parts(seen: Seen, person: Person) -> Iterator[tuple[str, str]]:

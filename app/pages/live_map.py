@@ -80,7 +80,9 @@ def live_map(run: RunView, numbers: Numbers) -> LiveMap:
     """The map of a run; all measurements of a position stand in its one cell."""
     by_place: dict[Place, list[CellState]] = {}
     for cell in run.cells:
-        by_place.setdefault((cell.theta_deg, cell.psi_deg), []).append(cell)
+        given_up = run.ended and cell.state in _BUSY
+        kept = cell._replace(state="todo") if given_up else cell
+        by_place.setdefault((cell.theta_deg, cell.psi_deg), []).append(kept)
     asked = {(item.theta_deg, item.psi_deg) for item in run.open_commands if item.kind == "retake"}
     here = (run.position.theta_deg, run.position.psi_deg) if run.position and not run.ended else None
     cells = {

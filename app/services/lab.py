@@ -46,13 +46,17 @@ class Work:
 
 
 class Lab:
-    """Gives out `Work`. A `read` changes nothing; a `write` is all or nothing."""
+    """Gives out `Work`. A `read` changes nothing; a `write` is all or nothing.
+
+    `stopping` says that the service is about to end: whoever follows something lets go.
+    """
 
     def __init__(self, settings: Settings, database: Database, files: RecordFiles, queue: Queue) -> None:
         self.settings = settings
         self.database = database
         self.files = files
         self.queue = queue
+        self.stopping = False
 
     @contextmanager
     def read(self, person: Person) -> Iterator[Work]:

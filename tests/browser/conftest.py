@@ -74,6 +74,26 @@ def demonstration(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]
     stopped(process, log)
 
 
+@pytest.fixture(scope="module")
+def serve(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[Callable[..., tuple[subprocess.Popen[str], str]]]:
+    """Starts a service on a data folder, on a free port or the one given; gives its process and address."""
+    folder, processes = tmp_path_factory.mktemp("served"), []
+
+    def start(data: Path, port: int = 0) -> tuple[subprocess.Popen[str], str]:
+        log = folder / f"log-{len(processes)}"
+        process, lines = started(
+            command("serve", "--port", str(port), "--data", str(data)), "Driftbook is on", log
+        )
+        processes.append((process, log))
+        return process, lines[-1].rsplit(" ", 1)[1]
+
+    yield start
+    for process, log in processes:
+        stopped(process, log)
+
+
 @pytest.fixture(scope="session")
 def chromium() -> Iterator[Browser]:
     path = shutil.which("chromium")

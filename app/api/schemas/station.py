@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Annotated, Any, Final, Self
 
-from pydantic import ConfigDict, Field, StringConstraints, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from app.api.schemas.common import Angle, Id, Incoming, Moment, Name, NotNegative, Number, Outgoing, Text
 from app.api.schemas.measuring import Repeat
@@ -34,8 +34,7 @@ Current = Annotated[Number, Field(ge=-1e6, le=1e6)]
 Left = Annotated[NotNegative, Field(le=366 * 86_400)]
 Whole = Annotated[int, Field(strict=True, ge=0, le=_LARGEST_WHOLE)]
 Take = Annotated[int, Field(strict=True, ge=0, lt=10_000, description="0 first attempt, 1 the next.")]
-Short = Annotated[str, StringConstraints(max_length=200, pattern=r"^[^\x00]*$")]
-Value = Number | Annotated[int, Field(strict=True)] | Short
+Value = Number | Annotated[int, Field(strict=True)] | Annotated[bool, Field(strict=True)] | Text | None
 
 
 class Said(Incoming):

@@ -160,6 +160,7 @@ def test_a_run_that_has_ended_leads_on(
         assert f'class="btn primary big" id="live-next" href="/sessions/{measured}"' in text
         assert "1 record is still on the station’s disk" in text
         assert "sse-connect" in text  # it may be taken up again
+        assert "recording" not in words(text)  # nothing goes on where it was
         assert 'name="kind"' not in text.replace('type="hidden" name="kind"', "")
     result = solving(stocked, measured)
     tell(stocked, measured, replace(START, run="b", phase="finished", waiting=0))
