@@ -1,6 +1,7 @@
 """What holds for every page, whoever asks for it."""
 
 import re
+from datetime import UTC, datetime
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -8,8 +9,10 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.pages.base import TEMPLATES
-from app.services import access, calibrations
+from app.services import access, calibrations, live
 from app.services.lab import Lab
+from app.services.live_views import CellState, Report, RunEvent, Sentence, Spot
+from app.services.sessions import NewSession, open_session
 
 READABLE = [
     "/", "/gyros", "/types/GVK-6", "/stands", "/stands/S1", "/stands/S1/uncertainty", "/certificates",
@@ -34,6 +37,13 @@ POSTED = [
     "/certificates/new",
     "/simulations/new",
 ]
+
+AT = datetime(2026, 3, 1, 9, 30, tzinfo=UTC)
+RUNNING = Report(
+    "S1-PC", "run-a", 1, AT, "acquiring", Spot(0.0, 90.0, 0, 0), 0.0045, -0.0021, True, 0.5, 605.0, 2,
+    (CellState(0.0, 0.0, 0, "suspicious"), CellState(0.0, 90.0, 0, "running"), CellState(90.0, 0.0, 0, "todo")),
+    (RunEvent(1, AT, "warning", "spike", Sentence("The record has a spike."), 0.0, 0.0),),
+)  # fmt: skip
 
 
 class Outline(HTMLParser):
@@ -123,9 +133,12 @@ def test_pages_are_clean_and_named(technician: TestClient, stocked: Lab, languag
 def test_pages_of_a_measured_session_are_clean_and_named(
     technician: TestClient, stocked: Lab, measured: int, result: int
 ) -> None:
-    with stocked.read(access.SYSTEM) as work:
+    with stocked.write(access.SYSTEM) as work:
         first = calibrations.calibration(work, result).inputs[0].id
+        watched = open_session(work, NewSession("0417", "S1")).id
+        live.report(work, watched, RUNNING)
     paths = [
+        f"/sessions/{measured}/live", f"/sessions/{watched}/live", f"/sessions/{watched}", "/",
         "/sessions", f"/sessions/{measured}", f"/sessions/{measured}/entry",
         f"/sessions/{measured}/entry?unit=ma&columns=all", "/results", f"/results/{result}", "/gyros/0417",
         f"/measurements/{first}",
