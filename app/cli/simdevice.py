@@ -13,26 +13,27 @@ from typing import Annotated
 
 import typer
 
+from app.cli.scenario_options import Latitude, ScenarioName, Seed, scenario_bench
 from app.cli.signal_options import blaming
+from app.cli.simulated_stand import register
 from app.errors import Conflict, Invalid, problem
 from simdevice.ammeter_device import AmmeterDevice
-from simdevice.bench import Bench
 from simdevice.clock import Clock
 from simdevice.faults import Kind, parse
 from simdevice.laboratory import Laboratory
-from simdevice.scenarios import SCENARIOS
 from simdevice.scpi.instrument import Instrument
 from simdevice.serving import listening
 from simdevice.stand_device import StandDevice
-from solver.units import rad_from_deg
 
-_HELP = "; ".join(f"{item.name}: {item.summary}" for item in SCENARIOS.values())
 _STOP_SIGNALS = ("SIGINT", "SIGTERM", "SIGBREAK")
 """Those of these that the system has end the instruments; the last is Windows' Ctrl-Break."""
 _STOP_WAITS_S = 0.1
 """Windows wakes no event loop for a signal, so the loop wakes by itself."""
 
 simdevice = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
+
+
+simdevice.command()(register)
 
 
 @simdevice.callback()
@@ -47,14 +48,12 @@ def serve(
     ] = 5025,
     ammeter_port: Annotated[int, typer.Option("--ammeter-port", min=0, max=65535, help="Likewise.")] = 5026,
     host: Annotated[str, typer.Option("--host", help="Address to listen on.")] = "127.0.0.1",
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Everything random comes from it.")] = 0,
-    scenario: Annotated[str, typer.Option("--scenario", help=_HELP)] = "gvk-6",
+    seed: Seed = 0,
+    scenario: ScenarioName = "gvk-6",
     speed: Annotated[
         float, typer.Option("--speed", min=0.001, max=1e6, help="Seconds of the laboratory in one second.")
     ] = 1.0,
-    latitude: Annotated[
-        float | None, typer.Option("--latitude", min=-90, max=90, help="Degrees, south negative.")
-    ] = None,
+    latitude: Latitude = None,
     duration: Annotated[
         float, typer.Option("--duration", min=0.01, max=3600, help="Of a record in the session's plan, s.")
     ] = 60.0,
@@ -77,7 +76,7 @@ def serve(
 ) -> None:
     """Serve a simulated stand and ammeter as SCPI instruments until Ctrl-C."""
     clock = Clock(_moment(powered_on), speed)
-    bench = _bench(scenario, seed, latitude, rate, duration)
+    bench = replace(scenario_bench(scenario, seed, latitude), rate=rate, duration=duration)
     with blaming("--fault"):
         laboratory = Laboratory(bench, clock, [parse(text) for text in fault or ()])
     devices = [
@@ -116,16 +115,6 @@ def _asked_to_stop() -> Iterator[Event]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-def _bench(name: str, seed: int, latitude: float | None, rate: float, duration: float) -> Bench:
-    if name not in SCENARIOS:
-        raise Invalid(problem("unknown-scenario", "There is no scenario %(name)s. There are: %(names)s.",
-                              column="--scenario", name=name, names=", ".join(SCENARIOS)))  # fmt: skip
-    bench = replace(SCENARIOS[name].bench(seed), rate=rate, duration=duration)
-    if latitude is None:
-        return bench
-    return replace(bench, stand=replace(bench.stand, latitude=rad_from_deg(latitude)))
 
 
 def _moment(text: str | None) -> float:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from app.cli import signal_options as signal
+from app.cli.scenario_options import Latitude, ScenarioName, Seed, scenario_bench
 from app.errors import Conflict, Invalid, problem
 from app.exchange.archive import save
 from app.exchange.numbers import typed
@@ -28,22 +29,17 @@ class Format(StrEnum):
     PARQUET = "parquet"
 
 
-_HELP = "; ".join(f"{item.name}: {item.summary}" for item in SCENARIOS.values())
-
-
 def simulate(
     out: Annotated[Path, typer.Option("--out", help="Folder to write; it must be empty or new.")],
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Everything random comes from it.")] = 0,
-    latitude: Annotated[
-        float | None, typer.Option("--latitude", min=-90, max=90, help="Degrees, south negative.")
-    ] = None,
+    seed: Seed = 0,
+    latitude: Latitude = None,
     positions: Annotated[
         str, typer.Option("--positions", help="16, 8, or a list such as 0/0,0/90,90/180.")
     ] = "16",
     duration: Annotated[float, typer.Option("--duration", min=0.01, max=3600, help="Of a record, s.")] = 60.0,
     rate: Annotated[float, typer.Option("--rate", min=1, max=20000, help="Samples per second.")] = 200.0,
     file_format: Annotated[Format, typer.Option("--format", help="Of the record files.")] = Format.CSV,
-    scenario: Annotated[str, typer.Option("--scenario", help=_HELP)] = "gvk-6",
+    scenario: ScenarioName = "gvk-6",
     repeats: Annotated[
         int, typer.Option("--repeats", min=1, max=100, help="How often each position is measured.")
     ] = 1,
@@ -93,14 +89,9 @@ def _latitude_deg(latitude: float | None, bench: Bench) -> float:
 def _bench(
     name: str, seed: int, places: tuple[Position, ...], latitude: float | None, rate: float, duration: float
 ) -> Bench:
-    if name not in SCENARIOS:
-        raise Invalid(problem("unknown-scenario", "There is no scenario %(name)s. There are: %(names)s.",
-                              column="--scenario", name=name, names=", ".join(SCENARIOS)))  # fmt: skip
+    bench = scenario_bench(name, seed, latitude, places)
     with signal.blaming("--rate"):
-        bench = replace(SCENARIOS[name].bench(seed, places), rate=rate, duration=duration)
-    if latitude is not None:
-        bench = replace(bench, stand=replace(bench.stand, latitude=rad_from_deg(latitude)))
-    return bench
+        return replace(bench, rate=rate, duration=duration)
 
 
 def _positions(text: str) -> tuple[Position, ...]:
