@@ -21,7 +21,7 @@ def test_register_makes_the_simulated_stand_known(
     assert driftbook("simulate", "--out", tmp_path / "s", *bench, "--duration", 0.1).code == 0
     client = service.client()
     stand = client.get("/stands/SIM").json()
-    assert (stand["latitude_deg"], stand["certificate"]) == (-33.9, "SIM-south-7")
+    assert (stand["latitude_deg"], stand["certificate"]["number"]) == (-33.9, "SIM-south-7")
     assert client.get("/gyros/SIM-7").json()["type"] == "GVK-6"
     kept = client.get("/stands/SIM/certificates/SIM-south-7", headers={"accept": "text/csv"}).content
     written = (tmp_path / "s" / "certificate.csv").read_bytes()
