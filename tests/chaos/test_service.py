@@ -5,12 +5,7 @@ calibrations, and repeat what was not acknowledged. Meanwhile the service is kil
 again, thirty times. What it acknowledged is written down by the clients and compared at the end.
 """
 
-import os
 import random
-import signal
-import socket
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -27,6 +22,7 @@ from app.services import access, sessions
 from app.services.access import SYSTEM
 from app.services.opening import open_lab
 from app.settings import Settings
+from tests.chaos.processes import Service, free_port
 
 KILLS = 30
 SEED = 20261122
@@ -34,35 +30,6 @@ PLACES = [(theta, psi) for theta in (0, 90, 180, 270) for psi in (0, 90, 180, 27
 PATIENCE_S = 120
 
 pytestmark = pytest.mark.chaos
-
-
-class Service:
-    """``driftbook serve`` as a process on one data folder and port."""
-
-    def __init__(self, data: Path, port: int, log: Path) -> None:
-        self._command = [sys.executable, "-m", "app", "serve", "--data", str(data), "--port", str(port)]
-        self.url = f"http://127.0.0.1:{port}"
-        self._log = log
-        self.process: subprocess.Popen[bytes] | None = None
-
-    def start(self) -> None:
-        with self._log.open("ab") as log:
-            self.process = subprocess.Popen(self._command, stdout=log, stderr=log, start_new_session=True)
-
-    def wait(self) -> None:
-        for _ in range(600):
-            try:
-                if httpx.get(self.url + "/health/ready", timeout=1).status_code == 200:
-                    return
-            except httpx.TransportError:
-                pass
-            time.sleep(0.1)
-        raise AssertionError(f"the service does not come up:\n{self._log.read_text()[-3000:]}")
-
-    def kill(self) -> None:
-        if self.process is not None and self.process.poll() is None:
-            os.kill(self.process.pid, signal.SIGKILL)
-            self.process.wait()
 
 
 @dataclass
@@ -139,12 +106,6 @@ class Stand(threading.Thread):
             self.refused.append(answer.text)
             time.sleep(0.05)
         raise AssertionError(f"{verb} {path} was never acknowledged")
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def prepare(settings: Settings) -> str:
