@@ -17,7 +17,7 @@ from app.station import runs
 from app.station.clock import Clock
 from app.station.contracts import EmergencyStop, InstrumentFault, InstrumentLost, Place
 from app.station.controls import Controls, StopAsked
-from app.station.description import StationFile, station_file
+from app.station.description import SIMULATED, StationFile, station_file
 from app.station.durable import SpoolFailed
 from app.station.entries import Acquiring, Entry, Judged, Planned, Sent, Warmed
 from app.station.finishing import NotFinished, named
@@ -27,13 +27,23 @@ from app.station.preparing import SIXTEEN
 from app.station.running import Orders, live_through
 
 station = typer.Typer(
-    help="Drive a stand and an ammeter through the automated cycle.", pretty_exceptions_enable=False
+    help="Drive a stand and an ammeter through the automated cycle.",
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
 )
 
 _BEYOND_CHANCE = 1e-4
 """Of the fit's χ²: one good session in ten thousand is looked at in vain."""
 
-Config = Annotated[Path, typer.Option("--config", help="TOML file that describes the instruments.")]
+Config = Annotated[
+    Path,
+    typer.Option(
+        "--config",
+        help="TOML file that describes the instruments (default: the simulated ones).",
+        show_default=False,
+    ),
+]
 StandAddress = Annotated[
     str | None, typer.Option("--stand-address", help="VISA address that holds instead of the file's.")
 ]
@@ -42,7 +52,6 @@ AmmeterAddress = Annotated[str | None, typer.Option("--ammeter-address", help="L
 
 @station.command()
 def run(
-    config: Config,
     gyro: Annotated[str, typer.Option("--gyro", help="Serial number.")],
     stand: Annotated[str, typer.Option("--stand", help="Stand, as the service calls it.")],
     server: Annotated[str, typer.Option("--server", help="Address of the service.")],
@@ -82,6 +91,7 @@ def run(
         float, typer.Option("--speed", min=0.01, max=1e6, help="Lab seconds per second of simulated instruments.")
     ] = 1.0,
     poll: Annotated[float, typer.Option("--poll", min=0.001, max=60, help="Lab seconds between looks.")] = 0.5,
+    config: Config = SIMULATED,
     stand_address: StandAddress = None,
     ammeter_address: AmmeterAddress = None,
 ) -> None:  # fmt: skip
@@ -198,7 +208,11 @@ def _contradicted(answer: dict[str, Any]) -> bool:
 
 
 @station.command()
-def check(config: Config, stand_address: StandAddress = None, ammeter_address: AmmeterAddress = None) -> None:
+def check(
+    config: Config = SIMULATED,
+    stand_address: StandAddress = None,
+    ammeter_address: AmmeterAddress = None,
+) -> None:
     """Ask both instruments who they are and how they stand; nothing moves."""
     described = station_file(config, stand_address=stand_address, ammeter_address=ammeter_address)
     stand, ammeter = open_stand(described.stand), open_ammeter(described.ammeter)
@@ -223,3 +237,9 @@ def _stand(stand: Any) -> str:
 def _ammeter(ammeter: Any) -> str:
     identity, currents = ammeter.identify(), ammeter.reading()
     return f"{identity}; Jx {currents.jx_ma:.6g} mA, Jy {currents.jy_ma:.6g} mA"
+
+
+@station.command()
+def describe() -> None:
+    """Print the simulated instruments' file, which explains itself: the beginning of one for other instruments."""
+    typer.echo(SIMULATED.read_text(encoding="utf-8"), nl=False)

@@ -214,8 +214,8 @@ def _channel(
             "error",
             Message(
                 "spike",
-                "%(channel)s leaps in %(count)d samples, by up to %(size).3g nA, at %(when).4g s first. Measure again; "
-                "look for switching nearby and for loose plugs.",
+                "Samples of %(channel)s that leap: %(count)d, by up to %(size).0f nA, the first at %(when).4g s. "
+                "Measure again; look for switching nearby and for loose plugs.",
                 {
                     "channel": name,
                     "count": int(off.sum()),
@@ -327,7 +327,7 @@ def _drift(name: str, values: Array, t_s: Array, matters_na: float, false_alarm:
         "warning",
         Message(
             "drifting",
-            "%(channel)s changes by %(change).3g nA within the record. Let the gyro warm up and the stand settle; "
+            "%(channel)s changes by %(change).0f nA within the record. Let the gyro warm up and the stand settle; "
             "then measure again.",
             {"channel": name, "change": change_na},
         ),

@@ -122,7 +122,7 @@ class Rules:
             return []
         message = Message(
             "closing",
-            "The first position measured again at the end differs by %(change).3g nA, more than %(allowed).3g nA: "
+            "The first position measured again at the end differs by %(change).0f nA, more than %(allowed).0f nA: "
             "gyro, stand or ammeter changed during the session. Let them warm up and measure all of it again.",
             {"change": change, "allowed": allowed},
         )

@@ -70,7 +70,7 @@ class OddPair:
         (theta, psi), (_, opposite) = self.places
         return Message(
             "partner",
-            "θ %(theta).6g°, ψ %(psi).6g° and %(opposite).6g°: the sum of the currents differs by %(size).3g nA from "
+            "θ %(theta).6g°, ψ %(psi).6g° and %(opposite).6g°: the sum of the currents differs by %(size).0f nA from "
             "that of the other pairs. One of the two was measured in another position, or something disturbed it. "
             "Measure both again.",
             {"theta": theta, "psi": psi, "opposite": opposite, "size": self.size_na},
