@@ -3,7 +3,7 @@
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -114,7 +114,10 @@ def _begin(spool: Spool, orders: Orders, described: StationFile) -> None:
         certificate=orders.certificate, temperature_c=orders.temperature_c,
     )  # fmt: skip
     runs.require_same(spool.folder, spool.history, wanted, orders.places)
-    if not spool.history.places:
+    earlier = spool.history.begun
+    # The run's name is the key of its session: begun twice with the same words it must stay one.
+    again = earlier and replace(wanted, run=earlier.run, started_at=earlier.started_at)
+    if earlier is None or (not spool.history.places and again != earlier):
         spool.add(wanted)
     spool.add(Resumed())
 
