@@ -6,7 +6,7 @@ from typing import Final, NoReturn
 
 from app.errors import AppError, problem
 from app.station.blocks import BlockFile
-from app.station.contracts import InstrumentFault, Place, StandStatus
+from app.station.contracts import Currents, InstrumentFault, Place, StandStatus
 from app.station.controls import TargetLeft
 from app.station.entries import Abandoned, Acquiring, Finding, Judged, Said, Started, Target, Verdict
 from app.station.history import Attempt
@@ -191,9 +191,11 @@ def _collect(at: Workplace, attempt: Attempt, blocks: BlockFile) -> bool:
     begun, acquiring = at.history.begun, attempt.acquiring
     assert begun is not None
     assert acquiring is not None
+    last = at.live.now.currents
     at.live.turn_to("acquiring", attempt.target, attempt.started.take)
-    at.live.show(settled=True, fraction=blocks.samples / begun.samples)
+    at.live.show(currents=last, settled=True, fraction=blocks.samples / begun.samples)
     deadline, overload = at.clock.deadline(at.patience.silence_s), False
+    had = blocks.samples
     while blocks.samples < begun.samples:
         acquired = at.ammeter.status()
         if acquired.label not in (None, acquiring.label) or acquired.samples < blocks.samples:
@@ -202,8 +204,8 @@ def _collect(at: Workplace, attempt: Attempt, blocks: BlockFile) -> bool:
         _require_at(at, at.watch(), attempt.target.place)
         ready = min(acquired.samples, begun.samples) - blocks.samples
         if ready >= at.block_samples or (ready and not acquired.running):
-            _fetch(at, blocks, min(ready, at.block_samples))
-            at.live.show(fraction=blocks.samples / begun.samples)
+            currents = _fetch(at, blocks, min(ready, at.block_samples))
+            at.live.show(currents=currents, fraction=blocks.samples / begun.samples)
             deadline = at.clock.deadline(at.patience.silence_s + at.block_samples / begun.rate_hz)
         elif not acquired.running:
             break
@@ -214,14 +216,18 @@ def _collect(at: Workplace, attempt: Attempt, blocks: BlockFile) -> bool:
             at.wait()
     if blocks.samples < _FEWEST:
         _give_up(at, attempt, _EMPTY)
+    if blocks.samples > had:
+        _require_at(at, at.look(), attempt.target.place)  # to the end
     return overload
 
 
-def _fetch(at: Workplace, blocks: BlockFile, most: int) -> None:
+def _fetch(at: Workplace, blocks: BlockFile, most: int) -> Currents:
+    """Bring the next samples onto the disk; their mean."""
     block = at.ammeter.fetch(blocks.samples, most)
     if block.first != blocks.samples or not 0 < len(block.t_s) <= most:
         raise TakeFailed(problem("ammeter-block", "The ammeter gave other samples than those asked for."))
     blocks.append(block)
+    return Currents(float(block.jx_ma.mean()), float(block.jy_ma.mean()))
 
 
 def _judge(at: Workplace, attempt: Attempt, blocks: BlockFile, overload: bool) -> None:
