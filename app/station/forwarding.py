@@ -83,8 +83,10 @@ class Forwarder(threading.Thread):
         """Open the session or send one record; False when there is nothing to do."""
         with self._spool.lock:
             begun, session = self._spool.history.begun, self._spool.history.session
-            waiting = self._spool.history.to_send()
-        if begun is None:
+            waiting, planned = self._spool.history.to_send(), bool(self._spool.history.places)
+        if (
+            begun is None or not planned
+        ):  # nothing is opened for a run whose instruments have not answered yet
             return False
         if session is None:
             self._spool.add(Opened(service.open_session(begun)))
