@@ -57,6 +57,24 @@ def send_once(client: httpx.Client, verb: str, path: str, **what: Any) -> httpx.
     return answer
 
 
+def asked(client: httpx.Client, verb: str, path: str, *keys: str, **what: Any) -> dict[str, Any]:
+    """Send a request and read the object that it is answered by, which has these keys.
+
+    Raises
+    ------
+    Unreachable, ServerRefused
+        As `send_once`; the former also when something else than the service answered (a proxy's page, say).
+    """
+    answer = send_once(client, verb, path, **what)
+    try:
+        said = answer.json()
+    except ValueError:
+        said = None
+    if not isinstance(said, dict) or not said.keys() >= set(keys):
+        raise _away(client, "what answers there is no Driftbook")
+    return said
+
+
 def send(client: httpx.Client, verb: str, path: str, **what: Any) -> httpx.Response:
     """Send a request, again and again for a while when the service is away; raises as `send_once`."""
     pause_s = _FIRST_PAUSE_S

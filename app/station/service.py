@@ -4,7 +4,7 @@ from dataclasses import asdict
 from types import TracebackType
 from typing import Any, Self
 
-from app.station.client import connected, currents_request, send_once
+from app.station.client import asked, connected, currents_request
 from app.station.contracts import Place
 from app.station.entries import Begun
 from app.station.history import Attempt
@@ -23,34 +23,32 @@ class Service:
         body = {name: value for name, value in said.items() if value is not None}
         body["started_at"] = begun.started_at.isoformat()
         key = {"Idempotency-Key": f"station-{begun.run}"}
-        return int(send_once(self._client, "POST", "/sessions", json=body, headers=key).json()["id"])
+        return int(asked(self._client, "POST", "/sessions", "id", json=body, headers=key)["id"])
 
     def described(self, session: int) -> tuple[tuple[Place, ...], str]:
         """Positions of the certificate that the session names, in its order, and the gyro's type."""
-        said = send_once(self._client, "GET", f"/sessions/{session}").json()
+        said = asked(self._client, "GET", f"/sessions/{session}", "positions", "type")
         places = [Place(item["theta_deg"], item["psi_deg"]) for item in said["positions"]]
         return tuple(dict.fromkeys(places)), str(said["type"])
 
     def put_record(self, session: int, attempt: Attempt, content: bytes) -> None:
-        """Bring a record; the same bytes again change nothing."""
+        """Bring a record; the same bytes again change nothing. An answer that does not name it is none."""
         path, params = currents_request(session, *attempt.target)
-        send_once(self._client, "PUT", path, params=params, content=content)
+        asked(self._client, "PUT", path, "record_sha256", params=params, content=content)
 
     def calibrate(self, session: int, method: str) -> str:
         """Ask for the calibration; give the job."""
         path = f"/sessions/{session}/calibrations"
-        return str(send_once(self._client, "POST", path, json={"method": method}).json()["id"])
+        return str(asked(self._client, "POST", path, "id", json={"method": method})["id"])
 
     def job(self, job: str) -> dict[str, Any]:
         """How a job stands."""
-        answer: dict[str, Any] = send_once(self._client, "GET", f"/jobs/{job}").json()
-        return answer
+        return asked(self._client, "GET", f"/jobs/{job}", "state", "result", "error")
 
     def calibration(self, address: str) -> dict[str, Any]:
         """A result, by the address that its job gave."""
         path = str(self._client.base_url.copy_with(path=address))
-        answer: dict[str, Any] = send_once(self._client, "GET", path).json()
-        return answer
+        return asked(self._client, "GET", path, "method")
 
     def page(self, address: str) -> str:
         """Address of the page of a result, by the address that its job gave."""
@@ -59,10 +57,8 @@ class Service:
 
     def report(self, session: int, said: dict[str, Any]) -> dict[str, Any]:
         """Tell how the station stands; the answer brings commands."""
-        answer: dict[str, Any] = send_once(
-            self._client, "PUT", f"/sessions/{session}/station", json=said
-        ).json()
-        return answer
+        path = f"/sessions/{session}/station"
+        return asked(self._client, "PUT", path, "commands", "events_seen", json=said)
 
     def close(self) -> None:
         """Close the connection."""
