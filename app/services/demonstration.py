@@ -6,9 +6,11 @@ data, and every result is solved from them.
 """
 
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -80,6 +82,20 @@ class _Visit:
     last: bool
 
 
+@dataclass(frozen=True, slots=True)
+class _Solution:
+    """A session that is being solved while the next ones are measured."""
+
+    session_id: int
+    at: datetime
+    wanted: dict[str, Any]
+    output: Future[dict[str, Any]]
+
+    def store(self, work: Work) -> None:
+        work.now = self.at
+        calibrations.store(work, self.session_id, self.wanted, self.output.result())
+
+
 def build(lab: Lab, now: datetime | None = None) -> None:
     """Fill an empty laboratory; one transaction, so that an interrupted build leaves nothing."""
     now = (now or datetime.now(UTC)).replace(microsecond=0)
@@ -93,8 +109,12 @@ def build(lab: Lab, now: datetime | None = None) -> None:
         for item in fleet:
             gyros.add_gyro(work, item.serial, item.kind.name)
         certified = _equip(work, now)
-        for visit in _visits(fleet, now):
-            _measure(work, visit, *_stand_at(certified, visit.at))
+        with ThreadPoolExecutor(2) as aside:
+            for solution in [
+                _measure(work, visit, *_stand_at(certified, visit.at), aside) for visit in _visits(fleet, now)
+            ]:
+                if solution is not None:
+                    solution.store(work)
         _leave_one_open(work, fleet[2], certified[-1][1], certified[-1][2], now)
 
 
@@ -166,7 +186,10 @@ def _visits(fleet: Sequence[FleetGyro], now: datetime) -> Iterator[_Visit]:
     yield from sorted(visits, key=lambda visit: visit.at)
 
 
-def _measure(work: Work, visit: _Visit, stand: Stand, rows: Sequence[CertificateRow]) -> None:
+def _measure(
+    work: Work, visit: _Visit, stand: Stand, rows: Sequence[CertificateRow], aside: ThreadPoolExecutor
+) -> _Solution | None:
+    """A session, solved; the last one of a gyro, whose Monte Carlo check takes its time, aside."""
     work.now = visit.at + timedelta(minutes=43)
     work.person = Person("petrova", "I. Petrova", "technician", frozenset())
     bench = visit.gyro.bench(stand, visit.time, visit.start, visit.number, _ammeter())
@@ -179,7 +202,11 @@ def _measure(work: Work, visit: _Visit, stand: Stand, rows: Sequence[Certificate
         ),
     )  # fmt: skip
     ingest.save(work, session.id, _kept(work, bench) if visit.last else _means_only(bench, visit.at))
-    _solve(work, session.id, rows, TRIALS if visit.last else 0)
+    wanted, question = _question(work, session.id, rows, TRIALS if visit.last else 0)
+    if visit.last:
+        return _Solution(session.id, work.now, wanted, aside.submit(question))
+    calibrations.store(work, session.id, wanted, question())  # its gyro's next session is judged against it
+    return None
 
 
 def _means_only(bench: Bench, at: datetime) -> list[ingest.Measured]:
@@ -210,12 +237,15 @@ def _means(bench: Bench, at: datetime) -> list[MeansRow]:
     ]  # fmt: skip
 
 
-def _solve(work: Work, session_id: int, rows: Sequence[CertificateRow], trials: int) -> None:
+def _question(
+    work: Work, session_id: int, rows: Sequence[CertificateRow], trials: int
+) -> tuple[dict[str, Any], Callable[[], dict[str, Any]]]:
+    """What is asked of a session, and what answers it with no database at hand."""
     measured = measurement.current(work.db, session_id)
     wanted: dict[str, Any] = {"method": "both", "inputs": [row.id for row in measured], "trials": trials}
     stated = calibrations.stated(work, find_session(work, session_id), wanted)
-    output = solved([calibrations.means_row(row) for row in measured], rows, LATITUDE_DEG, "both", stated)
-    calibrations.store(work, session_id, wanted, output)
+    means = [calibrations.means_row(row) for row in measured]
+    return wanted, partial(solved, means, rows, LATITUDE_DEG, "both", stated)
 
 
 def _leave_one_open(
