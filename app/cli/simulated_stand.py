@@ -9,7 +9,7 @@ import typer
 
 from app.cli.scenario_options import Latitude, ScenarioName, Seed, scenario_bench
 from app.services.simulated import certificate_lab, common_lab
-from app.station.client import ServerRefused, connected, send
+from app.station.sending.client import ServerRefused, connected, send
 from simdevice.bench import Bench
 from solver.units import deg_from_rad
 

@@ -13,16 +13,16 @@ from app.cli.solve import Method
 from app.cli.tables import print_result
 from app.errors import AppError
 from app.exchange.planned import listed_positions
-from app.station import runs
 from app.station.clock import Clock
 from app.station.contracts import EmergencyStop, InstrumentFault, InstrumentLost, Place
 from app.station.controls import Controls, StopAsked
-from app.station.description import SIMULATED, StationFile, station_file
-from app.station.durable import SpoolFailed
-from app.station.entries import Acquiring, Entry, Judged, Planned, Sent, Warmed
 from app.station.finishing import NotFinished, named
-from app.station.history import History
-from app.station.instruments import open_ammeter, open_stand
+from app.station.instruments.description import SIMULATED, StationFile, station_file
+from app.station.instruments.opening import open_ammeter, open_stand
+from app.station.keeping import runs
+from app.station.keeping.durable import SpoolFailed
+from app.station.keeping.entries import Acquiring, Entry, Judged, Planned, Sent, Warmed
+from app.station.keeping.history import History
 from app.station.preparing import SIXTEEN
 from app.station.running import Orders, live_through
 

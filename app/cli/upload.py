@@ -16,7 +16,7 @@ from app.errors import Invalid, problem
 from app.exchange.record_files import write_record_parquet
 from app.exchange.rows import Facts, MeansRow
 from app.exchange.session_folder import SessionFiles
-from app.station.client import connected, currents_request, followed, send
+from app.station.sending.client import connected, currents_request, followed, send
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Final
 
-_LEAST_PATIENCE_S: Final = 3.0
+_LEAST_PATIENCE_S: Final = 10.0
 """No deadline is nearer on the wall: at a thousandfold speed a busy computer would miss any other."""
 _NAP_S: Final = 0.1
 

@@ -1,8 +1,8 @@
 """The takes that count, beside each other: a position that does not fit the others is measured anew, then refused."""
 
 from app.station.contracts import Currents, Place
-from app.station.entries import Compared, Doubt, Said, Target
-from app.station.history import History
+from app.station.keeping.entries import Compared, Doubt, Said, Target
+from app.station.keeping.history import History
 from app.station.workplace import Workplace
 
 

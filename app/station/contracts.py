@@ -1,8 +1,8 @@
 """What the cycle needs of a stand and an ammeter, whichever they are; laboratory units.
 
-A driver (`app.station.stand`, `app.station.ammeter`) answers at once: `home`, `move` and `start` begin
-something, whose progress `status` tells. `InstrumentLost` says that an instrument does not answer: the
-cycle connects anew and goes on; `InstrumentFault` that it answers, and that something is wrong with it.
+A driver (`stand` and `ammeter` in `app.station.instruments`) answers at once: `home`, `move` and `start`
+begin something, whose progress `status` tells. `InstrumentLost` says that an instrument does not answer:
+the cycle connects anew and goes on; `InstrumentFault` that it answers, and that something is wrong with it.
 """
 
 from dataclasses import dataclass

@@ -13,13 +13,13 @@ from app.errors import AppError, problem
 from app.station.comparing import compare
 from app.station.contracts import EmergencyStop, InstrumentFault, InstrumentLost, Place
 from app.station.controls import StopAsked
-from app.station.durable import SpoolFailed
-from app.station.entries import Abandoned, Said, Warmed
 from app.station.finishing import Finishing, NotFinished
-from app.station.live import Phase
+from app.station.keeping.durable import SpoolFailed
+from app.station.keeping.entries import Abandoned, Said, Warmed
 from app.station.measuring import TakeFailed, go, measure, settle
 from app.station.plan import Compare, Finish, Forward, Measure, Prepare, Solve, Step, WarmUp, next_step
 from app.station.preparing import Preparing
+from app.station.sending.live import Phase
 from app.station.workplace import Workplace
 from solver.errors import Message
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.errors import AppError
-from app.station.client import ServerRefused, Unreachable, result_of
-from app.station.entries import Finished, Queued, Said, Solved, Target, Unsolved
-from app.station.forwarding import Forwarder
+from app.station.keeping.entries import Finished, Queued, Said, Solved, Target, Unsolved
 from app.station.measuring import shown
 from app.station.plan import Forward, Solve, Step, missing, next_step
-from app.station.service import Service
+from app.station.sending.client import ServerRefused, Unreachable, result_of
+from app.station.sending.forwarding import Forwarder
+from app.station.sending.service import Service
 from app.station.workplace import Workplace
 from solver.errors import Message
 

@@ -7,12 +7,12 @@ from typing import Final, Protocol
 import numpy as np
 
 from app.exchange.rows import CurrentRecord
-from app.station import checks, partners
-from app.station.checks import Expectations, Take, Thresholds
 from app.station.contracts import Currents, Place
-from app.station.entries import Finding, Said, Target, Verdict
-from app.station.history import History
-from app.station.settling import RestRule, RestWatch
+from app.station.judgement import checks, partners
+from app.station.judgement.checks import Expectations, Take, Thresholds
+from app.station.judgement.settling import RestRule, RestWatch
+from app.station.keeping.entries import Finding, Said, Target, Verdict
+from app.station.keeping.history import History
 from solver.errors import Message
 
 _NA_PER_MA: Final = 1e6

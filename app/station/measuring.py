@@ -5,12 +5,13 @@ from contextlib import closing
 from typing import Final, NoReturn
 
 from app.errors import AppError, problem
-from app.station.blocks import BlockFile
+from app.station.clock import Clock
 from app.station.contracts import Currents, InstrumentFault, Place, StandStatus
 from app.station.controls import TargetLeft
-from app.station.entries import Abandoned, Acquiring, Finding, Judged, Said, Started, Target, Verdict
-from app.station.history import Attempt
-from app.station.stand import apart_deg
+from app.station.instruments.stand import apart_deg
+from app.station.keeping.blocks import BlockFile
+from app.station.keeping.entries import Abandoned, Acquiring, Finding, Judged, Said, Started, Target, Verdict
+from app.station.keeping.history import Attempt
 from app.station.workplace import Workplace
 from solver.errors import Message
 
@@ -22,6 +23,10 @@ _MOVED: Final = Message(
 )
 _EMPTY: Final = Message("acquisition-empty", "The ammeter acquired nothing; the record is begun anew.")
 _FEWEST: Final = 2
+_STANDSTILL_DEG: Final = 1e-3
+_STANDSTILL_S: Final = 20.0
+_STANDSTILL_LOOKS: Final = 20
+"""Also so many looks: at a thousandfold speed seconds pass between two of them."""
 
 
 class _Lost(Exception):
@@ -85,14 +90,36 @@ def go(at: Workplace, place: Place, target: Target | None = None, take: int = 0)
         home(at)
     at.live.turn_to("moving", target, take)
     at.stand.move(place)
-    deadline = at.clock.deadline(at.patience.move_s)
-    while at.look().moving:
-        if deadline.passed:
+    deadline, progress = at.clock.deadline(at.patience.move_s), _Progress(at.clock)
+    while (status := at.look()).moving:
+        if deadline.passed or progress.none(status.place):
             at.stand.stop()
-            raise TakeFailed(problem("stall", "The stand does not arrive at %(place)s in time; it was stopped.",
-                                     place=shown(place)))  # fmt: skip
+            raise TakeFailed(
+                problem(
+                    "stall",
+                    "The stand does not arrive at %(place)s: at %(stands)s it was stopped.",
+                    place=shown(place),
+                    stands=shown(status.place),
+                )
+            )
         at.wait()
     _require_at(at, at.look(), place)  # a look whose encoders were asked before it came to rest is of no use
+
+
+class _Progress:
+    """Whether the encoders of a moving stand change at all."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._place: Place | None = None
+        self._since_s, self._looks = 0.0, 0
+
+    def none(self, place: Place) -> bool:
+        """Take a look in; tell whether there was no change for so long and so many looks that it has stalled."""
+        if self._place is None or apart_deg(self._place, place) > _STANDSTILL_DEG:
+            self._place, self._since_s, self._looks = place, self._clock.lab_s(), 0
+        self._looks += 1
+        return self._looks > _STANDSTILL_LOOKS and self._clock.lab_s() - self._since_s > _STANDSTILL_S
 
 
 def home(at: Workplace) -> None:

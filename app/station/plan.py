@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from app.station.entries import Target
-from app.station.history import History
+from app.station.keeping.entries import Target
+from app.station.keeping.history import History
 
 
 @dataclass(frozen=True, slots=True)

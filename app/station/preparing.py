@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from app.station import durable
-from app.station.client import ServerRefused, Unreachable
 from app.station.contracts import Place
-from app.station.entries import Opened, Planned
-from app.station.service import Service
-from app.station.spool import Spool
+from app.station.keeping import durable
+from app.station.keeping.entries import Opened, Planned
+from app.station.keeping.spool import Spool
+from app.station.sending.client import ServerRefused, Unreachable
+from app.station.sending.service import Service
 from solver.errors import Message
 
 SIXTEEN: Final = tuple(

@@ -7,25 +7,25 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from app.station import runs
-from app.station.ammeter import DescribedAmmeter
 from app.station.clock import Clock
 from app.station.contracts import Place
 from app.station.controls import Controls
 from app.station.cycle import Cycle
-from app.station.description import StationFile
-from app.station.entries import Begun, Entry, Resumed
 from app.station.finishing import Finishing
-from app.station.forwarding import Forwarder
-from app.station.history import History
-from app.station.instruments import open_ammeter, open_stand
+from app.station.instruments.ammeter import DescribedAmmeter
+from app.station.instruments.description import StationFile
+from app.station.instruments.opening import open_ammeter, open_stand
+from app.station.instruments.stand import DescribedStand
 from app.station.judging import Rules
-from app.station.live import Live
+from app.station.keeping import runs
+from app.station.keeping.entries import Begun, Entry, Resumed
+from app.station.keeping.history import History
+from app.station.keeping.spool import Spool
 from app.station.preparing import Memory, Preparing
-from app.station.reporting import PATIENCE_S, Reporter
-from app.station.service import Service
-from app.station.spool import Spool
-from app.station.stand import DescribedStand
+from app.station.sending.forwarding import Forwarder
+from app.station.sending.live import Live
+from app.station.sending.reporting import PATIENCE_S, Reporter
+from app.station.sending.service import Service
 from app.station.workplace import Patience, Workplace
 
 

@@ -10,11 +10,11 @@ from app.exchange.positions import same_angle
 from app.station.clock import Clock
 from app.station.contracts import Ammeter, EmergencyStop, Place, Stand, StandStatus
 from app.station.controls import Command, Controls, Kind, StopAsked, TargetLeft
-from app.station.entries import Abandoned, Commanded, Said, Target
-from app.station.history import History
 from app.station.judging import Judge
-from app.station.live import Live
-from app.station.spool import Spool
+from app.station.keeping.entries import Abandoned, Commanded, Said, Target
+from app.station.keeping.history import History
+from app.station.keeping.spool import Spool
+from app.station.sending.live import Live
 from solver.errors import Message
 
 _NAP_S: Final = 0.1

@@ -23,8 +23,8 @@ from app.services import access, sessions
 from app.services.access import SYSTEM
 from app.services.opening import open_lab
 from app.settings import Settings
-from app.station.description import SIMULATED
-from app.station.spool import history_in
+from app.station.instruments.description import SIMULATED
+from app.station.keeping.spool import history_in
 from simdevice.scenarios import scenario
 from solver.units import arcsec_from_rad, deg_from_rad
 from tests.chaos.processes import Program, Service, free_port

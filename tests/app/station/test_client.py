@@ -3,8 +3,8 @@
 import httpx
 import pytest
 
-from app.station import client
-from app.station.client import ServerRefused, Unreachable, asked, followed, send, send_once
+from app.station.sending import client
+from app.station.sending.client import ServerRefused, Unreachable, asked, followed, send, send_once
 
 PROXY = httpx.Response(200, html="<p>Please sign in to the network.</p>")
 

@@ -13,9 +13,10 @@ import pyarrow.parquet as pq
 import pytest
 from unreal import PLACES, Room, objection
 
-from app.station import durable, finishing
-from app.station.durable import SpoolFailed
-from app.station.entries import Target
+from app.station import finishing
+from app.station.keeping import durable
+from app.station.keeping.durable import SpoolFailed
+from app.station.keeping.entries import Target
 
 SPIKED, DISAGREEING = Target(*PLACES[2]), (PLACES[0], PLACES[1])
 

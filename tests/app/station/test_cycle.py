@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 from unreal import PLACES, Room, objection, true_record
 
-from app.station.entries import Target
+from app.station.keeping.entries import Target
 
 CLOSING = Target(*PLACES[0], repeat=1)
 

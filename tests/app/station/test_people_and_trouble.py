@@ -10,13 +10,14 @@ import pytest
 from unreal import PLACES, Room, true_record
 
 from app.errors import problem
-from app.station import cycle, finishing, forwarding
-from app.station.client import ServerRefused, Unreachable
+from app.station import cycle, finishing
 from app.station.contracts import EmergencyStop, InstrumentFault, InstrumentLost, Place
 from app.station.controls import Command, Controls, StopAsked
-from app.station.entries import Target
 from app.station.finishing import NotFinished
-from app.station.spool import Spool, history_in
+from app.station.keeping.entries import Target
+from app.station.keeping.spool import Spool, history_in
+from app.station.sending import forwarding
+from app.station.sending.client import ServerRefused, Unreachable
 
 pytestmark = pytest.mark.usefixtures("no_sync")
 LATER = Target(*PLACES[2])

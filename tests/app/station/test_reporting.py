@@ -9,11 +9,9 @@ import pytest
 from unreal import PLACES, RATE_HZ, SAMPLES
 
 from app.errors import problem
-from app.station import reporting
-from app.station.client import ServerRefused, Unreachable
 from app.station.contracts import Currents, Place
 from app.station.controls import Command, Controls
-from app.station.entries import (
+from app.station.keeping.entries import (
     Begun,
     Commanded,
     Finding,
@@ -25,9 +23,11 @@ from app.station.entries import (
     Started,
     Target,
 )
-from app.station.live import Live
-from app.station.reporting import Reporter
-from app.station.spool import Spool
+from app.station.keeping.spool import Spool
+from app.station.sending import reporting
+from app.station.sending.client import ServerRefused, Unreachable
+from app.station.sending.live import Live
+from app.station.sending.reporting import Reporter
 from solver.errors import Message
 
 pytestmark = pytest.mark.usefixtures("no_sync")

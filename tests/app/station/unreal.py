@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 
 from app.exchange.rows import CurrentRecord
-from app.station.client import ServerRefused, Unreachable
 from app.station.clock import Clock
 from app.station.contracts import Acquisition, Block, Currents, Place, StandStatus
 from app.station.controls import Controls
 from app.station.cycle import Cycle
-from app.station.entries import Begun, Finding, Resumed, Said, Target
 from app.station.finishing import Finishing
-from app.station.forwarding import Forwarder
-from app.station.history import Attempt, History
+from app.station.keeping.entries import Begun, Finding, Resumed, Said, Target
+from app.station.keeping.history import Attempt, History
+from app.station.keeping.spool import Spool
 from app.station.preparing import Memory, Preparing
-from app.station.spool import Spool
+from app.station.sending.client import ServerRefused, Unreachable
+from app.station.sending.forwarding import Forwarder
 from app.station.workplace import Workplace
 from solver.errors import Message
 

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from app.station.ammeter import DescribedAmmeter
-from app.station.description import SIMULATED, StationFile, station_file
-from app.station.instruments import open_ammeter, open_stand
-from app.station.stand import DescribedStand
+from app.station.instruments.ammeter import DescribedAmmeter
+from app.station.instruments.description import SIMULATED, StationFile, station_file
+from app.station.instruments.opening import open_ammeter, open_stand
+from app.station.instruments.stand import DescribedStand
 from simdevice.ammeter_device import AmmeterDevice
 from simdevice.clock import Clock
 from simdevice.faults import located, parse

@@ -1,0 +1,1 @@
+"""Instruments: described in TOML, spoken to over VISA; another stand or ammeter is another description."""
