@@ -44,7 +44,7 @@ def test_drawn_requests(filled: Service, operation: Any) -> None:
     headers = {"authorization": f"Bearer {filled.tokens['both']}"}
 
     @settings(
-        max_examples=25,
+        max_examples=12,
         derandomize=True,
         deadline=None,
         database=None,
