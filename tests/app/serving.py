@@ -95,7 +95,7 @@ class Server:
         """Serve this laboratory from now on: an application takes longer to build than a laboratory."""
         self.app.state.lab = lab
         programs = next(route for route in self.app.routes if isinstance(route, Mount) and route.path == API)
-        programs.app.state.lab = lab  # type: ignore[attr-defined]
+        programs.app.state.lab = lab
 
 
 @contextmanager

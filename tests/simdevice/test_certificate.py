@@ -106,7 +106,7 @@ def test_a_perfectly_known_stand_does_not_deviate() -> None:
 )
 def test_unusable_certificates_are_refused(arguments: dict[str, object], words: str) -> None:
     with pytest.raises(ValueError, match=words):
-        certify(**arguments)  # type: ignore[arg-type]
+        certify(**arguments)
 
 
 def test_positions_that_cannot_be_are_refused() -> None:

@@ -64,6 +64,18 @@ def test_it_says_where_it_listens_and_ends_cleanly(ending):
         assert (process.returncode, out, err) == (0, "", "")
 
 
+def test_it_ends_silently_with_a_client_on_the_line():
+    with (
+        serving() as (process, stand, _),
+        socket.create_connection(("127.0.0.1", stand), timeout=20) as client,
+    ):
+        client.sendall(b"*IDN?\n")
+        assert client.recv(1000).startswith(b"Driftbook,SIM-STAND")
+        process.send_signal(signal.SIGTERM)
+        out, err = process.communicate(timeout=20)
+        assert (process.returncode, out, err) == (0, "", "")
+
+
 def test_a_restarted_process_measures_the_same():
     """Killing an instrument's process does not power the gyro down, and keeps no state."""
     powered_on = (datetime.now(UTC) - timedelta(minutes=5)).isoformat()

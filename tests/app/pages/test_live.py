@@ -29,7 +29,7 @@ def cells(running: int = 10, **others: str) -> tuple[CellState, ...]:
     states = ["recorded"] * running + ["running"] + ["todo"] * (15 - running)
     for name, state in others.items():
         states[int(name[1:]) - 1] = state
-    return tuple(CellState(*place, 0, state) for place, state in zip(GRID, states, strict=True))  # type: ignore[arg-type]
+    return tuple(CellState(*place, 0, state) for place, state in zip(GRID, states, strict=True))
 
 
 START = Report("S1-PC", "run-a", 1, AT, "acquiring", HERE, -7.41e-4, 4.4946e-3, True, 0.25, 605.0, 2, cells())
@@ -56,7 +56,7 @@ def words(text: str) -> str:
 
 def event(number: int, level: str = "warning", **said: Any) -> RunEvent:
     sentence = Sentence(**({"message": "The record has a spike."} | said))
-    return RunEvent(number, AT, level, "spike", sentence, 90.0, 180.0)  # type: ignore[arg-type]
+    return RunEvent(number, AT, level, "spike", sentence, 90.0, 180.0)
 
 
 @pytest.fixture
@@ -119,7 +119,7 @@ def test_a_repeat_stands_in_its_positions_cell(stocked: Lab, opened: int) -> Non
         numbers = Numbers(sessions.detail(work, opened).positions)
     for state, word, shape in (("todo", "1 of 2", "ok"), ("moving", "moving", "running"),
                                ("refused", "refused", "out"), ("recorded", "recorded", "ok")):  # fmt: skip
-        sent = replace(START, run=f"run-{state}", cells=(*cells(), closing._replace(state=state)))  # type: ignore[arg-type]
+        sent = replace(START, run=f"run-{state}", cells=(*cells(), closing._replace(state=state)))
         tell(stocked, opened, sent)
         found = live_map(run_of(stocked, opened), numbers)
         first = found.rows[0][1][0]
@@ -154,7 +154,7 @@ def test_a_run_that_has_ended_leads_on(
 ) -> None:
     page = f"/sessions/{measured}/live"
     for phase, said in (("stopped", "The run was stopped."), ("failed", "The run ended before its time.")):
-        tell(stocked, measured, replace(START, run=phase, phase=phase, waiting=1))  # type: ignore[arg-type]
+        tell(stocked, measured, replace(START, run=phase, phase=phase, waiting=1))
         text = technician.get(page).text
         assert said in text
         assert f'class="btn primary big" id="live-next" href="/sessions/{measured}"' in text

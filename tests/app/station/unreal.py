@@ -199,7 +199,7 @@ class Room:
 
     folder: Path
     stand: UnrealStand = field(default_factory=UnrealStand)
-    ammeter: UnrealAmmeter = None  # type: ignore[assignment]
+    ammeter: UnrealAmmeter = None
     judge: Opinionated = field(default_factory=Opinionated)
     service: UnrealService = field(default_factory=UnrealService)
     controls: Controls = field(default_factory=Controls)
