@@ -2,9 +2,10 @@
 
 import html
 import json
+import queue
 import re
 import threading
-import time
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -13,6 +14,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.i18n import speaking
+from app.pages import live as live_page
 from app.pages import live_view
 from app.pages.live_map import Numbers, live_map
 from app.services import access, live, sessions
@@ -323,15 +325,34 @@ def _events(text: str) -> list[tuple[str, str]]:
     return found
 
 
+@pytest.fixture
+def seen_phase(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """Waits until the stream of events has seen the run in a phase."""
+    looks: queue.Queue[str] = queue.Queue()
+    look = live_page.look
+
+    def noted(*arguments: Any) -> Any:
+        seen = look(*arguments)
+        looks.put(seen.run.phase if seen else "")
+        return seen
+
+    def wait(phase: str) -> None:
+        while looks.get(timeout=30) != phase:
+            pass
+
+    monkeypatch.setattr(live_page, "look", noted)
+    return wait
+
+
 def test_the_page_follows_the_run_to_its_end(
-    technician: TestClient, stocked: Lab, opened: int, path: str
+    technician: TestClient, stocked: Lab, opened: int, path: str, seen_phase: Callable[[str], None]
 ) -> None:
     tell(stocked, opened, replace(START, phase="settling", settled=False))
 
     def go_on() -> None:
-        time.sleep(0.6)
+        seen_phase("settling")
         tell(stocked, opened, replace(START, sequence=2, events=(event(1),)))
-        time.sleep(0.6)
+        seen_phase(START.phase)
         tell(stocked, opened, replace(START, sequence=3, phase="finished", position=None))
 
     worker = threading.Thread(target=go_on)
@@ -350,13 +371,15 @@ def test_the_page_follows_the_run_to_its_end(
     assert found[-1][0] == "end"
 
 
-def test_a_stopped_run_is_followed_on(technician: TestClient, stocked: Lab, opened: int, path: str) -> None:
+def test_a_stopped_run_is_followed_on(
+    technician: TestClient, stocked: Lab, opened: int, path: str, seen_phase: Callable[[str], None]
+) -> None:
     tell(stocked, opened, replace(START, phase="stopped"))
 
     def go_on() -> None:
-        time.sleep(0.6)
+        seen_phase("stopped")
         tell(stocked, opened, replace(START, run="run-b"))
-        time.sleep(0.6)
+        seen_phase(START.phase)
         tell(stocked, opened, replace(START, run="run-b", sequence=2, phase="finished"))
 
     worker = threading.Thread(target=go_on)
