@@ -84,14 +84,20 @@ def lab(tmp_path: Path, queue: Notebook, prepared: Path) -> Iterator[Lab]:
     database.close()
 
 
-@pytest.fixture
-def application(lab: Lab) -> FastAPI:
+@pytest.fixture(scope="session")
+def all_pages() -> FastAPI:
+    """The pages, made once: their routes are put together at the first request, which takes a while."""
     app = FastAPI(openapi_url=None)
-    app.state.lab = lab
     for kind in (AppError, RequestValidationError, HTTPException, Exception):
         app.add_exception_handler(kind, pages.errors.page)
     pages.mount(app)
     return app
+
+
+@pytest.fixture
+def application(all_pages: FastAPI, lab: Lab) -> FastAPI:
+    all_pages.state.lab = lab
+    return all_pages
 
 
 @pytest.fixture
