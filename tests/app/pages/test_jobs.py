@@ -1,12 +1,15 @@
+import queue
 import re
 import threading
-import time
+from collections.abc import Callable
 from datetime import UTC, datetime
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
 from app.errors import Problem, problem
+from app.pages import jobs as job_pages
 from app.services import access, jobs, simulations
 from app.services.lab import Lab
 from app.services.ledger import JobLedger
@@ -88,14 +91,35 @@ def _events(text: str) -> list[tuple[str, str]]:
     return found
 
 
-def test_events_follow_the_job_to_its_end(technician: TestClient, stocked: Lab, job_id: str) -> None:
+@pytest.fixture
+def seen(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """Waits until the stream of events has seen the job in a state and phase."""
+    looks: queue.Queue[str] = queue.Queue()
+    look = job_pages._look
+
+    def noted(*arguments: Any) -> Any:
+        job, session = look(*arguments)
+        looks.put(f"{job.state} {job.phase}".strip())
+        return job, session
+
+    def wait(state: str) -> None:
+        while looks.get(timeout=30) != state:
+            pass
+
+    monkeypatch.setattr(job_pages, "_look", noted)
+    return wait
+
+
+def test_events_follow_the_job_to_its_end(
+    technician: TestClient, stocked: Lab, job_id: str, seen: Callable[[str], None]
+) -> None:
     ledger = JobLedger(stocked)
 
     def live() -> None:
-        time.sleep(0.4)
+        seen("queued")
         ledger.begin(job_id)
         ledger.progress(job_id, 0.5, "solving")
-        time.sleep(0.6)
+        seen("running solving")
         _fail(stocked, job_id, problem("any", "The file is empty. Export it again, or choose another file."))
 
     worker = threading.Thread(target=live)
@@ -106,7 +130,7 @@ def test_events_follow_the_job_to_its_end(technician: TestClient, stocked: Lab, 
     events = _events(answer.text)
     assert [text for name, text in events if name == "said"] == ["Ожидает", "Идёт", "Отказ"]
     states = [text for name, text in events if name == "state"]
-    assert "решается" in states[1]
+    assert "решается" in states[-2]
     assert "Файл пуст." in states[-1]  # in the language of the page
     assert events[-1][0] == "end"
 
