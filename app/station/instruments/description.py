@@ -252,7 +252,7 @@ def _connection(table: Table, name: str) -> Connection:
         write_termination=table.text("write_termination", "\n"),
         read_termination=end,
         timeout_s=table.number("timeout_s", 5.0, smallest=0.01, largest=600.0),
-        library=table.text("visa_library", "@py"),
+        visa_library=table.text("visa_library", "@py"),
         attributes=_attributes(table.table("visa_attributes")),
     )
 

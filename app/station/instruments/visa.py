@@ -51,7 +51,7 @@ class Connection:
     write_termination: str = "\n"
     read_termination: str = "\n"
     timeout_s: float = 5.0
-    library: str = "@py"
+    visa_library: str = "@py"
     attributes: Mapping[str, int | bool] = field(default_factory=dict)
 
 
@@ -181,7 +181,7 @@ class Instrument:
     def _connected(self) -> "MessageBasedResource":
         connection = self.connection
         try:
-            resource = _manager(connection.library).open_resource(
+            resource = _manager(connection.visa_library).open_resource(
                 connection.address, open_timeout=round(connection.timeout_s * _MS_PER_S)
             )
         # pyvisa-py raises a bare Exception for a host that cannot be reached.
@@ -265,12 +265,12 @@ def attribute_names() -> frozenset[str]:
     return frozenset(name for name in dir(constants) if name.startswith("VI_ATTR_"))
 
 
-def _manager(library: str) -> "ResourceManager":
+def _manager(visa_library: str) -> "ResourceManager":
     """The library's manager; VISA keeps one per library. Importing it takes half a second, so only here."""
     from pyvisa import ResourceManager
 
     with _opening:
-        return ResourceManager(library)
+        return ResourceManager(visa_library)
 
 
 def _require_open(resource: "MessageBasedResource") -> None:
