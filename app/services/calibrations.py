@@ -104,7 +104,7 @@ def store(work: Work, session_id: int, wanted: Mapping[str, Any], output: Mappin
         replaces_id=last.id if last else None, method=wanted["method"],
         solver_version=output["solver_version"], input_hash=output["input_hash"],
         certificate_id=session.certificate_id, inputs=list(wanted["inputs"]), result=output["result"],
-        result_digest=digest, created_at=work.now, created_by=work.person.name,
+        result_digest=digest, **output["fit"], created_at=work.now, created_by=work.person.name,
         parameters=[CalibrationParameter(**item) for item in output["parameters"]],
     )  # fmt: skip
     work.db.add(row)

@@ -92,6 +92,7 @@ def solved(
         "input_hash": calibration.input_hash,
         "solver_version": calibration.solver_version,
         "parameters": [row for answer in answers for row in _history_rows(answer)],
+        "fit": _fit(answers[0]),
     }
 
 
@@ -129,7 +130,14 @@ def _prior(stated: Stated) -> Prior | None:
     )
 
 
+def _fit(answer: Json) -> Json:
+    """χ² of the residuals against the stated noise; None where none is stated."""
+    fit = answer.get("fit") or {}
+    return {"chi2": fit.get("chi2"), "fit_dof": fit.get("dof")}
+
+
 def _history_rows(answer: Json) -> list[Json]:
+    noise = next((line for line in answer.get("budget", ()) if line["code"] == "currents"), None)
     return [
         {
             "method": answer["method"],
@@ -137,6 +145,7 @@ def _history_rows(answer: Json) -> list[Json]:
             "value": entry["value"],
             "standard_uncertainty": entry["standard_uncertainty"],
             "coverage_factor": entry["coverage_factor"],
+            "u_noise": noise and noise["standard_uncertainties"].get(name),
         }
         for name, entry in answer.get("parameters", {}).items()
     ]

@@ -1,6 +1,7 @@
 """The tables. `Base.metadata` knows all of them once this package is imported."""
 
 from app.store.tables.base import Base
+from app.store.tables.drift import Alarm, Baseline, DriftStudy, Event, StandAttitude
 from app.store.tables.equipment import (
     CertificatePosition,
     Gyro,
@@ -18,10 +19,14 @@ from app.store.tables.station import StationCommand, StationEvent, StationRun
 
 __all__ = [
     "Account",
+    "Alarm",
     "Base",
+    "Baseline",
     "Calibration",
     "CalibrationParameter",
     "CertificatePosition",
+    "DriftStudy",
+    "Event",
     "Gyro",
     "GyroType",
     "IdempotentReply",
@@ -32,6 +37,7 @@ __all__ = [
     "Record",
     "SignInLink",
     "Stand",
+    "StandAttitude",
     "StandCertificate",
     "Start",
     "StationCommand",

@@ -10,20 +10,27 @@ from app.store.tables.base import Base
 
 
 class GyroType(Base):
-    """A type of gyro; its limits are entered by the laboratory."""
+    """A type of gyro; its limits are entered by the laboratory.
+
+    `interval_days` is how long a calibration of a gyro of the type holds; None when nobody has said.
+    """
 
     __tablename__ = "gyro_type"
 
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str] = mapped_column(unique=True)
     note: Mapped[str] = mapped_column(default="")
+    interval_days: Mapped[int | None]
 
     limits: Mapped[list["TypeLimit"]] = relationship(lazy="selectin", cascade="all, delete-orphan")
     nominals: Mapped[list["TypeNominal"]] = relationship(lazy="selectin", cascade="all, delete-orphan")
 
 
 class TypeLimit(Base):
-    """Between what a parameter of the type has to lie, in laboratory units."""
+    """Between what a parameter of the type has to lie, in laboratory units.
+
+    `repeatability` is the largest standard deviation it may have from session to session; None: no limit.
+    """
 
     __tablename__ = "type_limit"
 
@@ -31,6 +38,7 @@ class TypeLimit(Base):
     parameter: Mapped[str] = mapped_column(primary_key=True)
     low: Mapped[float]
     high: Mapped[float]
+    repeatability: Mapped[float | None]
 
 
 class TypeNominal(Base):
@@ -49,7 +57,10 @@ class TypeNominal(Base):
 
 
 class Gyro(Base):
-    """One gyro, known by its serial number."""
+    """One gyro, known by its serial number.
+
+    `check` marks a check gyro: kept at the laboratory and measured regularly to watch the stands.
+    """
 
     __tablename__ = "gyro"
 
@@ -57,6 +68,7 @@ class Gyro(Base):
     serial: Mapped[str] = mapped_column(unique=True)
     type_id: Mapped[int] = mapped_column(sa.ForeignKey("gyro_type.id"), index=True)
     note: Mapped[str] = mapped_column(default="")
+    check: Mapped[bool] = mapped_column(default=False, server_default=sa.false())
     created_at: Mapped[datetime]
 
     type: Mapped[GyroType] = relationship(lazy="joined", innerjoin=True)

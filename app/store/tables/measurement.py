@@ -18,10 +18,11 @@ class MeasuringSession(Base):
     """
 
     __tablename__ = "session"
+    __table_args__ = (sa.Index(None, "gyro_id", "started_at"), sa.Index(None, "stand_id", "started_at"))
 
     id: Mapped[int] = mapped_column(primary_key=True)
-    gyro_id: Mapped[int] = mapped_column(sa.ForeignKey("gyro.id"), index=True)
-    stand_id: Mapped[int] = mapped_column(sa.ForeignKey("stand.id"), index=True)
+    gyro_id: Mapped[int] = mapped_column(sa.ForeignKey("gyro.id"))
+    stand_id: Mapped[int] = mapped_column(sa.ForeignKey("stand.id"))
     certificate_id: Mapped[int] = mapped_column(sa.ForeignKey("stand_certificate.id"))
     start_id: Mapped[int] = mapped_column(sa.ForeignKey("start.id"))
     latitude_deg: Mapped[float]

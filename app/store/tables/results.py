@@ -38,7 +38,8 @@ class Calibration(Base):
     """One result, frozen: `result` is the JSON text that the solver's answer was written as.
 
     `revision` counts the results of a session; `replaces_id` is the one before. `inputs` holds the
-    ids of the measurements that went in, in the solver's order.
+    ids of the measurements that went in, in the solver's order. `chi2` with `fit_dof` degrees of freedom
+    tells how the least-squares fit's residuals compare with the stated noise; None where none is stated.
     """
 
     __tablename__ = "calibration"
@@ -55,6 +56,8 @@ class Calibration(Base):
     inputs: Mapped[list[Any]]
     result: Mapped[str]
     result_digest: Mapped[str]
+    chi2: Mapped[float | None]
+    fit_dof: Mapped[int | None]
     created_at: Mapped[datetime]
     created_by: Mapped[str]
 
@@ -68,7 +71,8 @@ class CalibrationParameter(Base):
     """A parameter of a result, laid out for the drift history; laboratory units.
 
     `coverage_factor` is k of its expanded uncertainty; results of solver 1.0.0 had none of their own
-    and are shown with k = 2.
+    and are shown with k = 2. `u_noise` is the part of the standard uncertainty that comes from the noise of the
+    session's own currents: what differs from session to session when the gyro does not.
     """
 
     __tablename__ = "calibration_parameter"
@@ -81,6 +85,7 @@ class CalibrationParameter(Base):
     value: Mapped[float | None]
     standard_uncertainty: Mapped[float | None]
     coverage_factor: Mapped[float | None]
+    u_noise: Mapped[float | None]
 
 
 class IdempotentReply(Base):
