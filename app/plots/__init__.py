@@ -12,7 +12,8 @@ from app.plots.allan import AllanPoint, MeanPoint, allan
 from app.plots.autocorrelation import autocorrelation
 from app.plots.bode import MarginMark, bode
 from app.plots.convergence import Change, convergence
-from app.plots.drift import DriftEvent, DriftLimit, DriftPoint, drift
+from app.plots.drift import drift
+from app.plots.drift_marks import ControlStretch, DriftChange, DriftEvent, DriftLimit, DriftPoint, Forecast
 from app.plots.live import LivePoint, live
 from app.plots.live import news as live_news
 from app.plots.pareto import TradeMark, pareto
@@ -27,9 +28,12 @@ __all__ = [
     "LIMIT_SD",
     "AllanPoint",
     "Change",
+    "ControlStretch",
+    "DriftChange",
     "DriftEvent",
     "DriftLimit",
     "DriftPoint",
+    "Forecast",
     "LivePoint",
     "MarginMark",
     "MeanPoint",

@@ -75,6 +75,12 @@ REGION: Final[Spec] = {**WASH, "stroke": WASH["color"]}
 
 JOIN: Final[Spec] = {"color": colour("series-1"), "strokeWidth": 1}
 EVENT_LINE: Final[Spec] = {"color": colour("ink"), "strokeWidth": 1, "strokeDash": [1, 2]}
+CHANGE_LINE: Final[Spec] = {"color": colour("ink"), "strokeWidth": 1}
+CONTROL_LINE: Final[Spec] = {"color": colour("ink-3"), "strokeWidth": 1, "strokeDash": [4, 3]}
+CENTRE_LINE: Final[Spec] = {"color": colour("ink-3"), "strokeWidth": 1}
+TODAY_LINE: Final[Spec] = {"color": colour("ink-3"), "strokeWidth": 1, "strokeDash": [1, 2]}
+FORECAST_BAND: Final[Spec] = {"color": colour("series-1"), "opacity": 0.14}
+FORECAST_LINE: Final[Spec] = {"color": colour("series-1"), "strokeWidth": 1.25, "strokeDash": [2, 3]}
 ZERO_LINE: Final[Spec] = {"color": colour("ink-3"), "strokeWidth": 1}
 LABEL: Final[Spec] = {"color": colour("ink-2"), "fontSize": TEXT_PX}
 BEYOND_LABEL: Final[Spec] = {"color": colour("deviation"), "fontSize": TEXT_PX, "fontWeight": 600}

@@ -3,6 +3,7 @@
 import threading
 from typing import Final
 
+from app.plots import dates
 from app.plots.allan import template as allan_template
 from app.plots.autocorrelation import template as autocorrelation_template
 from app.plots.bode import template as bode_template
@@ -42,8 +43,9 @@ def make_templates() -> None:
     bode_template()
     poles_template()
     step_response_template()
-    for with_dates in (True, False):
-        drift_template(with_dates)
+    drift_template(False, 1)
+    for step in dates.STEPS:
+        drift_template(True, step)
     for channel in ("x", "y"):
         record_template(channel)
         live_template(channel)
