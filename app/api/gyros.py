@@ -17,6 +17,7 @@ _COLUMNS: Final[Columns[Gyro]] = {
     "serial": lambda item: item.serial,
     "type": lambda item: item.type,
     "note": lambda item: item.note,
+    "check": lambda item: int(item.check),
     "created_at": lambda item: item.created_at,
     "last_session": lambda item: item.last_session,
     "last_measured_at": lambda item: item.last_measured_at,
@@ -36,7 +37,7 @@ class GyroPart(Part):
 def add(body: NewGyro, caller: Uploader, response: Response) -> Gyro:
     """Register a gyro."""
     with caller.write() as work:
-        made = gyros.add_gyro(work, body.serial, body.type, body.note)
+        made = gyros.add_gyro(work, body.serial, body.type, body.note, check=body.check)
     response.headers["location"] = links.gyro(made.serial)
     return Gyro.model_validate(made)
 
@@ -58,6 +59,7 @@ def detail(serial: Name, caller: Reader) -> Gyro:
 
 @router.patch("/gyros/{serial}", responses={404: {}})
 def change(serial: Name, body: GyroChange, caller: Uploader) -> Gyro:
-    """Correct a gyro's type or note."""
+    """Correct a gyro's type or note, or make it a check gyro."""
     with caller.write() as work:
-        return Gyro.model_validate(gyros.change_gyro(work, serial, type_name=body.type, note=body.note))
+        changed = gyros.change_gyro(work, serial, type_name=body.type, note=body.note, check=body.check)
+        return Gyro.model_validate(changed)

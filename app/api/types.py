@@ -9,7 +9,7 @@ from fastapi import APIRouter
 from app.api.auth import Reader, Uploader
 from app.api.pagination import Listing
 from app.api.schemas.common import Name
-from app.api.schemas.equipment import GyroType, NewLimits, NewNominals
+from app.api.schemas.equipment import GyroType, Interval, NewLimits, NewNominals
 from app.errors import Invalid, Problem
 from app.services import gyros
 from app.services.lab import Work
@@ -29,8 +29,19 @@ def listing(caller: Reader) -> Listing[GyroType]:
 def set_limits(name: Name, body: NewLimits, caller: Uploader) -> GyroType:
     """Enter a type's limits, in laboratory units; an unknown type is created."""
     limits = {key: (limit.low, limit.high) for key, limit in body.limits.items()}
+    spread = {
+        key: limit.repeatability for key, limit in body.limits.items() if limit.repeatability is not None
+    }
     with caller.write() as work, _placed("limits", limits):
-        gyros.set_limits(work, name, limits)
+        gyros.set_limits(work, name, limits, repeatability=spread)
+        return _found(work, name)
+
+
+@router.put("/types/{name}/interval")
+def set_interval(name: Name, body: Interval, caller: Uploader) -> GyroType:
+    """Enter how many days a calibration of a type's gyros holds; an unknown type is created."""
+    with caller.write() as work:
+        gyros.set_interval(work, name, body.days)
         return _found(work, name)
 
 
@@ -70,11 +81,17 @@ def _found(work: Work, name: str) -> GyroType:
 
 
 def _shown(view: TypeView) -> GyroType:
-    limits = {name: {"low": low, "high": high} for name, (low, high) in view.limits.items()}
+    limits = {
+        name: {"low": low, "high": high, "repeatability": view.repeatability.get(name)}
+        for name, (low, high) in view.limits.items()
+    }
     nominals = {
         name: {"value": item.value, "standard_uncertainty": item.u, "per_kelvin": item.per_kelvin}
         for name, item in view.nominals.items()
     }
     return GyroType.model_validate(
-        {"name": view.name, "note": view.note, "gyros": view.gyros, "limits": limits, "nominals": nominals}
-    )
+        {
+            "name": view.name, "note": view.note, "gyros": view.gyros, "limits": limits, "nominals": nominals,
+            "interval_days": view.interval_days,
+        }
+    )  # fmt: skip

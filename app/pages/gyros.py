@@ -99,13 +99,13 @@ def new(request: Request, person: Writer, lab: TheLab) -> Response:
 @router.post("/gyros/new")
 def add(request: Request, person: Writer, lab: TheLab, sent: Sent) -> Response:
     """Register a gyro."""
-    form = Form.of(sent, "serial", "type", "note")
+    form = Form.of(sent, "serial", "type", "note", "check")
     try:
         fields = Fields(form)
         serial, kind, note = fields.text("serial", 60), fields.text("type", 60), fields.text("note")
         fields.check()
         with lab.write(person) as work:
-            made = gyros.add_gyro(work, serial, kind, note)
+            made = gyros.add_gyro(work, serial, kind, note, check=bool(form.value("check")))
     except AppError as error:
         return _form(request, lab, person, form.with_problems(*error.problems), error.status)
     return see(f"/gyros/{made.serial}")
@@ -113,16 +113,17 @@ def add(request: Request, person: Writer, lab: TheLab, sent: Sent) -> Response:
 
 @router.get("/gyros/{serial}/edit")
 def edit(request: Request, person: Writer, lab: TheLab, serial: str) -> Response:
-    """Ask for another type or note."""
+    """Ask for another type or note, and whether it is a check gyro."""
     with lab.read(person) as work:
         known = gyros.gyro(work, serial)
-    return _form(request, lab, person, Form({"type": known.type, "note": known.note}), gyro=known)
+    said = {"type": known.type, "note": known.note, "check": "1" if known.check else ""}
+    return _form(request, lab, person, Form(said), gyro=known)
 
 
 @router.post("/gyros/{serial}/edit")
 def change(request: Request, person: Writer, lab: TheLab, serial: str, sent: Sent) -> Response:
-    """Correct a gyro's type or note."""
-    form = Form.of(sent, "type", "note")
+    """Correct a gyro's type or note, or make it a check gyro."""
+    form = Form.of(sent, "type", "note", "check")
     with lab.read(person) as work:
         known = gyros.gyro(work, serial)
     try:
@@ -130,7 +131,7 @@ def change(request: Request, person: Writer, lab: TheLab, serial: str, sent: Sen
         kind, note = fields.text("type", 60), fields.text("note")
         fields.check()
         with lab.write(person) as work:
-            gyros.change_gyro(work, serial, type_name=kind, note=note)
+            gyros.change_gyro(work, serial, type_name=kind, note=note, check=bool(form.value("check")))
     except AppError as error:
         shown = form.with_problems(*error.problems)
         return _form(request, lab, person, shown, error.status, gyro=known)

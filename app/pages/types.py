@@ -1,7 +1,7 @@
-"""A type of gyro: the limits that its results are judged by, and what its gyros are expected to be."""
+"""A type of gyro: the limits that its results are judged by, how long they hold, what its gyros should be."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 from fastapi import APIRouter, Request, Response
@@ -19,11 +19,23 @@ from solver.records import PARAMETERS
 router = APIRouter()
 
 LIMITS: Final = ("low", "high")
+SPREAD: Final = "repeatability"
 NOMINAL: Final = ("nominal", "u", "per_kelvin")
+INTERVAL: Final = "interval_days"
 """Columns of the two tables; a field is one of them and a parameter with its unit: ``low_w0x_deg_per_h``."""
 
 _Limits = Mapping[str, tuple[float, float]]
 _Nominals = Mapping[str, Nominal]
+
+
+@dataclass(frozen=True, slots=True)
+class _Stated:
+    """What the form says of a type."""
+
+    limits: _Limits
+    spread: Mapping[str, float]
+    nominals: _Nominals
+    interval_days: int | None
 
 
 def _field(parameter: str, column: str) -> str:
@@ -31,9 +43,10 @@ def _field(parameter: str, column: str) -> str:
     return f"{'temperature' if unit else column}_{labels.field(parameter)}{unit}"
 
 
-_FIELDS: Final = tuple(
-    _field(name, column) for columns in (LIMITS, NOMINAL) for name in PARAMETERS for column in columns
-)
+_FIELDS: Final = (
+    INTERVAL,
+    *(_field(name, column) for columns in ((*LIMITS, SPREAD), NOMINAL) for name in PARAMETERS for column in columns),
+)  # fmt: skip
 
 
 @router.get("/types/{name}")
@@ -47,6 +60,10 @@ def detail(request: Request, person: Reader, lab: TheLab, name: str) -> Response
         for parameter, given in stated.items()
         for column, value in zip(columns, given, strict=True)
     }
+    values |= {
+        _field(parameter, SPREAD): entered(largest) for parameter, largest in kind.repeatability.items()
+    }
+    values[INTERVAL] = "" if kind.interval_days is None else str(kind.interval_days)
     return _shown(request, kind, Form(dict.fromkeys(_FIELDS, "") | values))
 
 
@@ -57,20 +74,23 @@ def change(request: Request, person: Writer, lab: TheLab, name: str, sent: Sent)
     form = Form.of(sent, *_FIELDS)
     try:
         fields = Fields(form)
-        limits, nominals = _limits(fields), _nominals(fields)
+        stated = _Stated(_limits(fields), _spread(fields), _nominals(fields), _interval(fields, form))
         fields.check()
-        _keep(lab, person, name, limits, nominals)
+        _keep(lab, person, name, stated)
     except AppError as error:
         return _shown(request, kind, form.with_problems(*error.problems), error.status)
     return see("/gyros")
 
 
-def _keep(lab: Lab, person: Person, name: str, limits: _Limits, nominals: _Nominals) -> None:
-    """Both or neither; `Invalid` with what is wrong with either."""
+def _keep(lab: Lab, person: Person, name: str, stated: _Stated) -> None:
+    """All or nothing; `Invalid` with what is wrong with any of it."""
     with lab.write(person) as work:
         problems = [
-            *_refused(lambda: gyros.set_limits(work, name, limits), LIMITS[0]),
-            *_refused(lambda: gyros.set_nominals(work, name, nominals), NOMINAL[1]),
+            *_refused(
+                lambda: gyros.set_limits(work, name, stated.limits, repeatability=stated.spread), LIMITS[0]
+            ),
+            *_refused(lambda: gyros.set_nominals(work, name, stated.nominals), NOMINAL[1]),
+            *_refused(lambda: gyros.set_interval(work, name, stated.interval_days), INTERVAL),
         ]
         if problems:
             raise Invalid(*problems)
@@ -82,7 +102,9 @@ def _refused(act: Callable[[], None], column: str) -> list[Problem]:
         act()
     except Invalid as error:
         return [
-            replace(item, column=_field(item.column, column)) if item.column in PARAMETERS else item
+            replace(item, column=_field(item.column, SPREAD if SPREAD in item.message.code else column))
+            if item.column in PARAMETERS
+            else item
             for item in error.problems
         ]
     return []
@@ -98,6 +120,15 @@ def _limits(fields: Fields) -> _Limits:
             fields.wrong(problem("half-limit", "Give both limits, or none.",
                                  column=_field(parameter, "low" if low is None else "high")))  # fmt: skip
     return found
+
+
+def _spread(fields: Fields) -> Mapping[str, float]:
+    given = {name: fields.optional(_field(name, SPREAD), "") for name in PARAMETERS}
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def _interval(fields: Fields, form: Form) -> int | None:
+    return fields.whole(INTERVAL) if form.value(INTERVAL).strip() else None
 
 
 def _nominals(fields: Fields) -> _Nominals:
@@ -124,6 +155,6 @@ def _find(lab: Lab, person: Person, name: str) -> TypeView:
 def _shown(request: Request, kind: TypeView, form: Form, status: int = 200) -> Response:
     return render(
         request, "types/detail.html", status=status, kind=kind, form=form, unit_of=labels.PARAMETER_UNITS,
-        limit_rows=[(name, [_field(name, column) for column in LIMITS]) for name in PARAMETERS],
+        limit_rows=[(name, [_field(name, column) for column in (*LIMITS, SPREAD)]) for name in PARAMETERS],
         nominal_rows=[(name, [_field(name, column) for column in NOMINAL]) for name in PARAMETERS],
     )  # fmt: skip

@@ -1,7 +1,7 @@
 """What services show: frozen, in laboratory units, with no tie to the database."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date, datetime
 from typing import Any, Generic, Literal, NamedTuple, TypeVar
 
@@ -39,13 +39,19 @@ class Nominal(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class TypeView:
-    """A type of gyro; `limits` maps a parameter to (low, high), `nominals` to what is expected of it."""
+    """A type of gyro; `limits` maps a parameter to (low, high), `nominals` to what is expected of it.
+
+    `interval_days` is how long a calibration holds, None when nobody has said; `repeatability` maps a
+    parameter to the largest standard deviation that it may have from session to session.
+    """
 
     name: str
     note: str
     gyros: int
     limits: Mapping[str, tuple[float, float]]
     nominals: Mapping[str, Nominal]
+    interval_days: int | None = None
+    repeatability: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +91,7 @@ class ResultSummary:
 
 @dataclass(frozen=True, slots=True)
 class GyroView:
-    """A gyro, and its latest result."""
+    """A gyro, and its latest result. `check` marks one that is kept to watch the stands."""
 
     serial: str
     type: str
@@ -95,6 +101,7 @@ class GyroView:
     last_measured_at: datetime | None
     last_stand: str | None
     last_result: ResultSummary | None
+    check: bool = False
 
 
 class CommonAngles(NamedTuple):

@@ -35,6 +35,7 @@ class NewGyro(Incoming):
     serial: Name
     type: Name
     note: Text = ""
+    check: bool = False
 
 
 class GyroChange(Incoming):
@@ -44,14 +45,16 @@ class GyroChange(Incoming):
 
     type: Name | None = None
     note: Text | None = None
+    check: bool | None = None
 
 
 class Gyro(Outgoing):
-    """A gyro and its latest result."""
+    """A gyro and its latest result; a `check` gyro is kept to watch the stands."""
 
     serial: str
     type: str
     note: str
+    check: bool
     created_at: datetime
     last_session: int | None
     last_measured_at: datetime | None
@@ -166,10 +169,15 @@ class Stand(Outgoing):
 
 
 class Limit(Incoming):
-    """Between what a parameter has to lie, in its laboratory unit."""
+    """Between what a parameter has to lie, in its laboratory unit.
+
+    `repeatability` is the largest standard deviation that it may have from session to session; null:
+    no limit.
+    """
 
     low: Number
     high: Number
+    repeatability: Positive | None = None
 
 
 class NewLimits(Incoming):
@@ -200,11 +208,20 @@ class NewNominals(Incoming):
     nominals: dict[Name, Nominal]
 
 
+class Interval(Incoming):
+    """How many days a calibration of the type's gyros holds; null: nobody says."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"days": 365}]})
+
+    days: Annotated[int, Field(strict=True, ge=1, le=3660)] | None
+
+
 class GyroType(Outgoing):
-    """A type of gyro, its limits, its nominal values and how many gyros it has."""
+    """A type of gyro, its limits, its nominal values, its calibration interval and how many gyros it has."""
 
     name: str
     note: str
     gyros: int
+    interval_days: int | None
     limits: dict[str, Limit]
     nominals: dict[str, Nominal]

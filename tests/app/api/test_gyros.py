@@ -12,7 +12,9 @@ def test_a_gyro_is_registered_with_its_type(client: httpx.Client) -> None:
     assert shown == made.json()
     assert (shown["serial"], shown["type"], shown["last_result"]) == ("0417", "GVK-6", None)
     types = client.get("/types").json()["items"]
-    assert types == [{"name": "GVK-6", "note": "", "gyros": 1, "limits": {}, "nominals": {}}]
+    assert types == [
+        {"name": "GVK-6", "note": "", "gyros": 1, "interval_days": None, "limits": {}, "nominals": {}}
+    ]
 
 
 def test_a_serial_number_is_registered_once(client: httpx.Client) -> None:
@@ -84,7 +86,7 @@ def test_json_unless_csv_is_preferred(client: httpx.Client) -> None:
 def test_limits_of_a_type(client: httpx.Client) -> None:
     made = client.put("/types/GVK-6/limits", json={"limits": {"wg": {"low": -3, "high": 3}}})
     assert made.status_code == 200
-    assert made.json()["limits"] == {"wg": {"low": -3.0, "high": 3.0}}
+    assert made.json()["limits"] == {"wg": {"low": -3.0, "high": 3.0, "repeatability": None}}
     replaced = client.put("/types/GVK-6/limits", json={"limits": {"w0x": {"low": -1, "high": 1}}})
     assert list(replaced.json()["limits"]) == ["w0x"]
     for limits, code, pointer in (

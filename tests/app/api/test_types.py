@@ -1,4 +1,4 @@
-"""What a type's gyros are expected to be."""
+"""What a type says of its gyros: limits, repeatability, interval, nominal values."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ def test_nominal_values_are_set_shown_and_replaced(client: httpx.Client) -> None
     made = client.put("/types/GVK-6/nominals", json={"nominals": {"kx": KX, "wg": WG}})
     assert made.status_code == 200, made.text
     assert made.json()["nominals"] == {"kx": KX, "wg": WG | {"per_kelvin": None}}
-    assert made.json()["limits"] == {"wg": {"low": -3.0, "high": 3.0}}
+    assert made.json()["limits"] == {"wg": {"low": -3.0, "high": 3.0, "repeatability": None}}
     assert client.get("/types").json()["items"] == [made.json()]
     again = client.put("/types/GVK-6/nominals", json={"nominals": {"kx": KX | {"value": 2060}}})
     assert again.json()["nominals"] == {"kx": KX | {"value": 2060.0}}
@@ -43,3 +43,26 @@ def test_nominal_values_that_cannot_be(client: httpx.Client, nominals: Any, poin
     assert refused.status_code == 422, refused.text
     assert [(item["pointer"], item["code"]) for item in refused.json()["errors"]] == [(pointer, code)]
     assert client.get("/types").json()["items"] == []
+
+
+def test_limits_carry_the_repeatability(client: httpx.Client) -> None:
+    limit = {"low": -3.0, "high": 3.0, "repeatability": 0.05}
+    made = client.put("/types/GVK-6/limits", json={"limits": {"w0x": limit}}).json()
+    assert made["limits"] == {"w0x": limit}
+    refused = client.put("/types/GVK-6/limits", json={"limits": {"w0x": limit | {"repeatability": 0}}})
+    assert refused.status_code == 422
+    assert refused.json()["errors"][0]["pointer"] == "#/limits/w0x/repeatability"
+
+
+def test_an_interval_is_set_and_taken_away(client: httpx.Client) -> None:
+    assert client.put("/types/GVK-6/interval", json={"days": 365}).json()["interval_days"] == 365
+    assert client.put("/types/GVK-6/interval", json={"days": None}).json()["interval_days"] is None
+    for days in (0, 3661, 1.5, "365"):
+        assert client.put("/types/GVK-6/interval", json={"days": days}).status_code == 422
+
+
+def test_a_gyro_is_made_a_check_gyro(client: httpx.Client) -> None:
+    made = client.post("/gyros", json={"serial": "0400", "type": "GVK-6", "check": True}).json()
+    assert made["check"] is True
+    assert client.patch("/gyros/0400", json={"note": "spare"}).json()["check"] is True
+    assert client.patch("/gyros/0400", json={"check": False}).json()["check"] is False

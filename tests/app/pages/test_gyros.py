@@ -107,3 +107,12 @@ def test_a_correction_that_cannot_be_used_changes_nothing(technician: TestClient
     assert answer.status_code == 422
     assert "lost?" in answer.text
     assert technician.get("/gyros/0000/edit").status_code == 404
+
+
+def test_a_gyro_is_made_a_check_gyro_and_back(technician: TestClient, stocked: Lab) -> None:
+    assert 'name="check" value="1" aria' in technician.get("/gyros/0417/edit").text
+    assert technician.post("/gyros/0417/edit", data={"type": "GVK-6", "check": "1"}).status_code == 303
+    assert 'name="check" value="1" checked' in technician.get("/gyros/0417/edit").text
+    assert technician.post("/gyros/0417/edit", data={"type": "GVK-6"}).status_code == 303
+    with stocked.read(access.SYSTEM) as work:
+        assert not gyros.gyro(work, "0417").check

@@ -5,7 +5,7 @@ from fastapi.testclient import TestClient
 
 from app.services import access, gyros
 from app.services.lab import Lab
-from app.services.views import Nominal
+from app.services.views import Nominal, TypeView
 
 
 def _limits(lab: Lab) -> dict[str, tuple[float, float]]:
@@ -109,3 +109,51 @@ def test_what_is_wrong_with_both_tables_is_said_at_once(technician: TestClient, 
 
 def test_an_unknown_type_is_not_there(technician: TestClient, stocked: Lab) -> None:
     assert technician.get("/types/none").status_code == 404
+
+
+def _type(lab: Lab) -> TypeView:
+    with lab.read(access.SYSTEM) as work:
+        return gyros.types(work)[0]
+
+
+LIMITS = {"low_w0x_deg_per_h": "-1", "high_w0x_deg_per_h": "1"}
+
+
+def test_repeatability_and_interval_are_set_with_the_limits(technician: TestClient, stocked: Lab) -> None:
+    sent = {**LIMITS, "repeatability_w0x_deg_per_h": "0,05", "interval_days": "365"}
+    assert technician.post("/types/GVK-6", data=sent).status_code == 303
+    assert (_type(stocked).repeatability, _type(stocked).interval_days) == ({"w0x": 0.05}, 365)
+    fields = dict(re.findall(r'name="(\w+)" value="([^"]*)"', technician.get("/types/GVK-6").text))
+    assert fields["repeatability_w0x_deg_per_h"] == "0.05"
+    assert technician.post("/types/GVK-6", data=fields).status_code == 303  # what stands there is kept
+    assert (_type(stocked).repeatability, _type(stocked).interval_days) == ({"w0x": 0.05}, 365)
+    assert technician.post("/types/GVK-6", data=LIMITS).status_code == 303
+    assert (_type(stocked).repeatability, _type(stocked).interval_days) == ({}, None)
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "sentence"),
+    [
+        ({"repeatability_w0x_deg_per_h": "0"}, "repeatability_w0x_deg_per_h", "must be greater than"),
+        ({"repeatability_wg_deg_per_h_per_g": "1"}, "repeatability_wg_deg_per_h_per_g", "Give the limits"),
+        ({"interval_days": "0"}, "interval_days", "An interval has 1 to 3660 days."),
+        ({"interval_days": "a year"}, "interval_days", "is not a whole number"),
+    ],
+)
+def test_a_repeatability_or_an_interval_that_cannot_be(
+    technician: TestClient, stocked: Lab, change: dict[str, str], field: str, sentence: str
+) -> None:
+    before = _type(stocked)
+    answer = technician.post("/types/GVK-6", data=LIMITS | change)
+    assert answer.status_code == 422
+    said = re.search(rf'id="f-{field}-problem">(.+?)</p>', answer.text)
+    assert said is not None
+    assert sentence in said[1]
+    assert _type(stocked) == before
+
+
+def test_limits_alone_keep_the_repeatability(stocked: Lab) -> None:
+    with stocked.write(access.SYSTEM) as work:
+        gyros.set_limits(work, "GVK-6", {"w0x": (-1.0, 1.0), "wg": (-9.0, 9.0)}, repeatability={"w0x": 0.1})
+        gyros.set_limits(work, "GVK-6", {"w0x": (-2.0, 2.0)})
+    assert _type(stocked).repeatability == {"w0x": 0.1}
