@@ -12,7 +12,7 @@ from pydantic import BaseModel, Field
 
 from app.api.schemas.common import Incoming
 from app.errors import Invalid, problem
-from app.exchange.written import csv_bytes
+from app.exchange.written import csv_bytes, parquet_bytes
 
 T = TypeVar("T")
 M = TypeVar("M", bound=BaseModel)
@@ -22,6 +22,14 @@ Columns = Mapping[str, Callable[[T], Cell]]
 
 CSV_TOO: Final[Responses] = {200: {"content": {"text/csv": {"schema": {"type": "string"}}}}}
 """For a route's `responses`: the list comes as CSV too."""
+PARQUET: Final = "application/vnd.apache.parquet"
+TABLE_TOO: Final[Responses] = {
+    200: {
+        "content": CSV_TOO[200]["content"]
+        | {PARQUET: {"schema": {"type": "string", "contentMediaType": PARQUET}}}
+    }
+}
+"""For a route's `responses`: it comes as a table too, CSV or Parquet."""
 
 
 class Part(Incoming):
@@ -79,12 +87,28 @@ def listed(request: Request, items: Sequence[M], next_key: str | None, columns: 
 
 def wants_csv(request: Request) -> bool:
     """Whether ``text/csv`` is preferred over JSON."""
-    wishes = {"text/csv": 0.0, "application/json": 0.0}
+    return _preferred(request, "text/csv") == "text/csv"
+
+
+def tabular(
+    request: Request, names: Sequence[str], rows: Callable[[], Sequence[Sequence[Cell]]]
+) -> Response | None:
+    """The answer as a table for whoever prefers CSV or Parquet; None for whoever wants JSON."""
+    form = _preferred(request, "text/csv", PARQUET)
+    if form == "application/json":
+        return None
+    content = (csv_bytes if form == "text/csv" else parquet_bytes)(names, rows())
+    return Response(content, headers={"vary": "Accept"}, media_type=form)
+
+
+def _preferred(request: Request, *others: str) -> str:
+    """The media type wished for most, JSON before the others."""
+    wishes = dict.fromkeys(("application/json", *others), 0.0)
     for entry in request.headers.get("accept", "").split(","):
         name, _, quality = entry.partition(";")
         if name.strip().lower() in wishes:
             wishes[name.strip().lower()] = _quality(quality)
-    return wishes["text/csv"] > wishes["application/json"]
+    return max(wishes, key=lambda name: wishes[name])
 
 
 def _quality(parameters: str) -> float:

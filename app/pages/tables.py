@@ -1,4 +1,4 @@
-"""A list as CSV or JSON: the same rows as on the page, in laboratory units, for spreadsheets and programs."""
+"""A list as CSV, JSON or Parquet: the same rows as on the page, in laboratory units, for spreadsheets and programs."""
 
 import csv
 import io
@@ -8,6 +8,8 @@ from datetime import datetime
 from typing import Any
 
 from fastapi import Response
+
+from app.exchange.written import parquet_bytes
 
 Row = dict[str, Any]
 
@@ -27,6 +29,15 @@ def csv_answer(rows: Sequence[Row], columns: Sequence[str], name: str) -> Respon
 def json_answer(rows: Sequence[Row]) -> Response:
     """The rows as a JSON list."""
     return Response(json.dumps(rows, default=_as_text, ensure_ascii=False), media_type="application/json")
+
+
+def parquet_answer(rows: Sequence[Row], columns: Sequence[str], name: str) -> Response:
+    """The rows as a Parquet file."""
+    content = parquet_bytes(columns, [[row.get(column) for column in columns] for row in rows])
+    return Response(
+        content, media_type="application/vnd.apache.parquet",
+        headers={"content-disposition": f'attachment; filename="{name}.parquet"'},
+    )  # fmt: skip
 
 
 def _as_text(value: object) -> str:
