@@ -15,6 +15,7 @@ from app.api import (
     calibrations,
     certificates,
     docs,
+    due,
     gyros,
     history,
     jobs,
@@ -43,7 +44,7 @@ _DESCRIPTION: Final = (
 )
 _NOUNS: Final = (
     gyros, history, types, loop, stands, planning, certificates, uploads, sessions, positions, calibrations,
-    simulations, station, jobs, validation, docs,
+    due, simulations, station, jobs, validation, docs,
 )  # fmt: skip
 
 

@@ -75,14 +75,17 @@ def cut(items: Sequence[T], part: Part, key: Callable[[T], str]) -> tuple[Sequen
 
 
 def listed(request: Request, items: Sequence[M], next_key: str | None, columns: Columns[M]) -> Response:
-    """Answer with a part of a list: JSON, or CSV for whoever prefers it."""
+    """Answer with a part of a list: JSON, or CSV or Parquet for whoever prefers it."""
     following = None if next_key is None else _address(request, next_key)
-    headers = {"vary": "Accept"} | ({"link": f'<{following}>; rel="next"'} if following else {})
-    if wants_csv(request):
-        rows = [[cell(item) for cell in columns.values()] for item in items]
-        return Response(csv_bytes(list(columns), rows), headers=headers, media_type="text/csv")
-    content = {"items": [item.model_dump(mode="json") for item in items], "next": following}
-    return JSONResponse(content, headers=headers)
+    answer = tabular(
+        request, list(columns), lambda: [[cell(item) for cell in columns.values()] for item in items]
+    )
+    if answer is None:
+        content = {"items": [item.model_dump(mode="json") for item in items], "next": following}
+        answer = JSONResponse(content, headers={"vary": "Accept"})
+    if following:
+        answer.headers["link"] = f'<{following}>; rel="next"'
+    return answer
 
 
 def wants_csv(request: Request) -> bool:

@@ -1,0 +1,79 @@
+"""Queries for the fleet: each gyro's last sound calibration, a type's gyros, who was measured on a stand."""
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import NamedTuple
+
+import sqlalchemy as sa
+from sqlalchemy.orm import Session
+
+from app.store.tables import Calibration, CalibrationParameter, Gyro, GyroType, MeasuringSession, Stand
+from solver.records import PARAMETERS
+
+
+class LastSound(NamedTuple):
+    """A gyro, and the latest of its sessions whose newest result determines every parameter; None without one."""
+
+    gyro_id: int
+    serial: str
+    type_name: str
+    check: bool
+    interval_days: int | None
+    session: int | None
+    calibration: int | None
+    measured_at: datetime | None
+    stand: str | None
+
+
+def last_sound(
+    db: Session, *, type_name: str | None = None, serials: Sequence[str] | None = None
+) -> Sequence[LastSound]:
+    """Every gyro, or a type's, or those named, by serial number.
+
+    The inner query walks a gyro's sessions backwards along their index and stops at the first sound one,
+    so that it costs the same for a long history as for a short one.
+    """
+    latest = sa.orm.aliased(MeasuringSession)
+    found = (
+        sa.select(latest.id)
+        .where(latest.gyro_id == Gyro.id, _determined(latest) == len(PARAMETERS))
+        .order_by(latest.started_at.desc())
+        .limit(1)
+        .correlate(Gyro)
+        .scalar_subquery()
+    )
+    query = (
+        sa.select(
+            Gyro.id, Gyro.serial, GyroType.name, Gyro.check, GyroType.interval_days, MeasuringSession.id,
+            _newest(MeasuringSession), MeasuringSession.started_at, Stand.name,
+        )
+        .join(GyroType, GyroType.id == Gyro.type_id)
+        .outerjoin(MeasuringSession, MeasuringSession.id == found)
+        .outerjoin(Stand, Stand.id == MeasuringSession.stand_id)
+        .order_by(Gyro.serial)
+    )  # fmt: skip
+    if type_name is not None:
+        query = query.where(GyroType.name == type_name)
+    if serials is not None:
+        query = query.where(Gyro.serial.in_(serials))
+    return [LastSound._make(row) for row in db.execute(query)]
+
+
+def _newest(session: type[MeasuringSession]) -> sa.ScalarSelect[int]:
+    """The highest revision of the outer query's session."""
+    result = sa.orm.aliased(Calibration)
+    newest = sa.select(sa.func.max(result.id)).where(result.session_id == session.id)
+    return newest.correlate(session).scalar_subquery()
+
+
+def _determined(session: type[MeasuringSession]) -> sa.ScalarSelect[int]:
+    """How many parameters its newest result determines by the method that stands for it (`services.verdicts`)."""
+    result, value = sa.orm.aliased(Calibration), sa.orm.aliased(CalibrationParameter)
+    method = sa.case((result.method == "both", "least-squares"), else_=result.method)
+    return (
+        sa.select(sa.func.count(value.value))
+        .join(result, result.id == value.calibration_id)
+        .where(result.id == _newest(session), value.method == method)
+        .correlate(session)
+        .scalar_subquery()
+    )
