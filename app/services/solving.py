@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from app.errors import Invalid, problem
+from app.exchange.attitude import attitude_json
 from app.exchange.distributions import monte_carlo_json, no_monte_carlo_json
 from app.exchange.examination import diagnosis_json
 from app.exchange.further_terms import model_json
@@ -21,6 +22,7 @@ from solver.calibrate import Calibration, calibrate
 from solver.error_model import observation_equations
 from solver.errors import SolverError
 from solver.estimators.model_comparison import compare_models
+from solver.estimators.stand_attitude import stand_attitude
 from solver.propagation.distributions import compare_with_budget, propagate_distributions
 from solver.records import Method
 
@@ -81,7 +83,9 @@ def solved(
         terms = compare_models(observation_equations(measured), measured, common)
     except SolverError as error:
         raise Invalid(problem(error.message.code, error.message.template, **error.message.values)) from error
-    examined = {**diagnosis_json(diagnosis), "model": model_json(terms)}
+    found = next(iter(calibration.solved.values()), None)
+    attitude = None if found is None else attitude_json(stand_attitude(found))
+    examined = {**diagnosis_json(diagnosis), "model": model_json(terms), "stand_attitude": attitude}
     drawn = _distributions(calibration, stated, report)
     further = {name: examined | drawn.get(name, {}) for name in calibration.answers}
     said = {"uncertainties": dict(stated.uncertainties), "prior": stated.prior}
@@ -93,6 +97,7 @@ def solved(
         "solver_version": calibration.solver_version,
         "parameters": [row for answer in answers for row in _history_rows(answer)],
         "fit": _fit(answers[0]),
+        "attitude": attitude,
     }
 
 

@@ -42,6 +42,10 @@ def _attitude() -> None:
         sa.Column("u_azimuth_arcsec", sa.Double(), nullable=True),
         sa.Column("level_north_arcsec", sa.Double(), nullable=True),
         sa.Column("u_level_north_arcsec", sa.Double(), nullable=True),
+        sa.Column("correlation", sa.Double(), nullable=True),
+        sa.Column("dof", sa.Double(), nullable=True),
+        sa.Column("u_certificate_azimuth_arcsec", sa.Double(), nullable=True),
+        sa.Column("u_certificate_level_north_arcsec", sa.Double(), nullable=True),
         sa.Column("level_east", sa.JSON(), nullable=True),
         sa.ForeignKeyConstraint(
             ["calibration_id"], ["calibration.id"], name=op.f("fk_stand_attitude_calibration_id")
@@ -80,6 +84,7 @@ def _baseline() -> None:
         sa.Column("centre", sa.Double(), nullable=False),
         sa.Column("scatter", sa.Double(), nullable=False),
         sa.Column("dof", sa.Double(), nullable=False),
+        sa.Column("u_typical", sa.Double(), nullable=False),
         sa.Column("limits", sa.Text(), nullable=False),
         sa.Column("rules", sa.JSON(), nullable=False),
         sa.Column("reason", sa.Text(), nullable=False),
@@ -109,6 +114,7 @@ def _alarm() -> None:
         sa.Column("values", sa.JSON(), nullable=False),
         sa.Column("raised_at", app.store.tables.base.UtcDateTime(), nullable=False),
         sa.Column("state", sa.Text(), nullable=False),
+        sa.Column("ended_at", app.store.tables.base.UtcDateTime(), nullable=True),
         sa.Column("acknowledged_at", app.store.tables.base.UtcDateTime(), nullable=True),
         sa.Column("acknowledged_by", sa.Text(), nullable=True),
         sa.Column("cause", sa.Text(), nullable=True),

@@ -17,8 +17,8 @@ X is e^(−iψ) at the commanded angles, A and n are X times i·cos θ and i·si
 and d but not X, which over the sixteen positions is orthogonal to them but for the certified angles, so that the
 first two change no parameter and stay in the residuals. These show ``X·(N·ε₃ − (V − g)·ε₂)``: the two turns are
 told apart only by ωк in one session, but by different ωg in sessions of several gyros. Hence each is estimated as
-if the other were zero, with the correlation of the two estimates. With s the derivative of the residuals by a turn, L·Lᵀ = K·ΣJ·Kᵀ, and P the
-projection that takes off whatever L⁻¹·design explains, weighted least squares gives::
+if the other were zero, with the correlation of the two estimates. With s the derivative of the residuals by a
+turn, L·Lᵀ = K·ΣJ·Kᵀ, and P the projection that takes off whatever L⁻¹·design explains, weighted least squares::
 
     ε = −(L⁻¹s)ᵀ·P·L⁻¹r / ‖P·L⁻¹s‖²,    u = 1/‖P·L⁻¹s‖,    r₂₃ = (P·L⁻¹s₂)·(P·L⁻¹s₃)·u₂·u₃
 

@@ -19,7 +19,9 @@ class StandAttitude(Base):
     Turning the base about the vertical (`azimuth`) or about north (`level_north`) changes no parameter
     of a gyro but the residuals; turning it about east changes parameters: `level_east` holds that
     change, by parameter, in laboratory units per arcsec. NULL where the positions show nothing.
-    The `u_` are those of the session's own noise.
+    Azimuth and level about north are each estimated as if the other were zero. The `u_` are those of the
+    session's own noise, with `correlation` and `dof` (NULL: infinite); the `u_certificate_` come of the
+    certificate's stated angles and are common to all sessions by it.
     """
 
     __tablename__ = "stand_attitude"
@@ -29,6 +31,10 @@ class StandAttitude(Base):
     u_azimuth_arcsec: Mapped[float | None]
     level_north_arcsec: Mapped[float | None]
     u_level_north_arcsec: Mapped[float | None]
+    correlation: Mapped[float | None]
+    dof: Mapped[float | None]
+    u_certificate_azimuth_arcsec: Mapped[float | None]
+    u_certificate_level_north_arcsec: Mapped[float | None]
     level_east: Mapped[dict[str, Any] | None]
 
 
@@ -59,9 +65,9 @@ class Baseline(Base):
 
     It judges sessions from `valid_from` up to the next baseline's. `calibrations` are the ids of the
     results it was computed from; `centre` and `scatter` (standard deviation from session to session beyond
-    the sessions' own u) are in laboratory units. `limits` is prediction or three-sigma; `rules` maps
-    ``individuals`` to a list of run rules, ``ewma`` and ``cusum`` to their settings. It never changes: a new one
-    replaces it, and `retired_at` then says when.
+    the sessions' own u) are in laboratory units, as `u_typical`, the u that those sessions had. `limits` is
+    prediction or three-sigma; `rules` maps ``individuals`` to a list of run rules, ``ewma`` and ``cusum`` to
+    their settings. It never changes: a new one replaces it, and `retired_at` then says when.
     """
 
     __tablename__ = "baseline"
@@ -76,6 +82,7 @@ class Baseline(Base):
     centre: Mapped[float]
     scatter: Mapped[float]
     dof: Mapped[float]
+    u_typical: Mapped[float]
     limits: Mapped[str]
     rules: Mapped[dict[str, Any]]
     reason: Mapped[str] = mapped_column(default="")
@@ -89,8 +96,9 @@ class Alarm(Base):
     """A finding that a person has to acknowledge with a cause; of a gyro's parameter, or of a stand.
 
     `kind` names the rule or the finding; `calibration_id` is the result that raised it, `last_calibration_id` the
-    last one that keeps it up. `code`, `template` and `values` are its sentence. `state` is open,
-    or acknowledged.
+    last one that keeps it up. `template` and `values` are its sentence. `state` is open, acknowledged, replaced
+    (the result that raised it counts no more: a correction replaced it) or lapsed (nothing shows it any
+    more: another baseline, an event that explains it); `ended_at` says since when it is not open.
     """
 
     __tablename__ = "alarm"
@@ -113,6 +121,7 @@ class Alarm(Base):
     values: Mapped[dict[str, Any]]
     raised_at: Mapped[datetime]
     state: Mapped[str] = mapped_column(index=True)
+    ended_at: Mapped[datetime | None]
     acknowledged_at: Mapped[datetime | None]
     acknowledged_by: Mapped[str | None]
     cause: Mapped[str | None]
