@@ -30,6 +30,9 @@ ROLES: Final = {
     "admin": ("read", "upload", "admin"),
 }
 
+JUDGES: Final = ("metrologist", "quality", "admin")
+"""Roles that judge the gyros' and the stands' drift: freeze a baseline, answer for an alarm."""
+
 SYSTEM: Final = Person("system", "Driftbook", "admin", frozenset(SCOPES))
 NOBODY: Final = Person("", "", "", frozenset())
 _IDLE: Final = timedelta(days=7)
@@ -178,6 +181,14 @@ def require(person: Person, scope: str) -> None:
     if scope not in person.scopes:
         raise Forbidden(problem("scope", "This needs the scope “%(scope)s”; you have %(have)s.",
                                 scope=scope, have=", ".join(sorted(person.scopes)) or "none"))  # fmt: skip
+
+
+def require_judge(person: Person) -> None:
+    """Raise `Forbidden` unless the person may upload and its role is one of `JUDGES`."""
+    require(person, "upload")
+    if person.role not in JUDGES:
+        raise Forbidden(problem("not-a-judge", "This is for the roles %(roles)s; yours is %(role)s.",
+                                roles=", ".join(JUDGES), role=person.role or "none"))  # fmt: skip
 
 
 def _open_login(work: Work, account: Account) -> str:

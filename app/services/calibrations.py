@@ -9,6 +9,7 @@ from typing import Any, Final, get_args
 from app.errors import Invalid, NotFound, problem
 from app.exchange.rows import MeansRow
 from app.services import jobs, priors, stands, verdicts
+from app.services.drift import following
 from app.services.gyros import nominals_of
 from app.services.job_views import job_view
 from app.services.lab import Work
@@ -16,7 +17,7 @@ from app.services.sessions import find_session, measurement_view, views
 from app.services.solving import Stated
 from app.services.views import CalibrationView, JobView, Page, SessionView
 from app.store import measurement, results
-from app.store.tables import Calibration, CalibrationParameter, Measurement, MeasuringSession
+from app.store.tables import Calibration, CalibrationParameter, Measurement, MeasuringSession, StandAttitude
 from solver.records import Method
 
 METHODS: Final = (*get_args(Method), "both")
@@ -109,6 +110,10 @@ def store(work: Work, session_id: int, wanted: Mapping[str, Any], output: Mappin
     )  # fmt: skip
     work.db.add(row)
     work.db.flush()
+    if output["attitude"] is not None:
+        work.db.add(StandAttitude(calibration_id=row.id, **output["attitude"]))
+    by = {item["method"] for item in output["parameters"]}
+    following.changed(work, session.gyro_id, methods=by, stand_id=session.stand_id)
     return row.id
 
 

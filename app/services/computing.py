@@ -11,6 +11,7 @@ from typing import Any
 
 from app.exchange.items import read_item
 from app.exchange.rows import CertificateRow, CurrentRecord, MeansRow
+from app.services.drift import studying
 from app.services.keeping import keep_record
 from app.services.simulated import Conditions, simulated_records
 from app.services.solving import Report, Stated, solved
@@ -49,6 +50,11 @@ def simulate(payload: Mapping[str, Any], report: Report) -> dict[str, Any]:
     report(0.92, "solving")
     result = solved(means, certificate, payload["latitude_deg"], payload["method"], stated)
     return {"measured": measured, "truth": truth, **result}
+
+
+def follow(payload: Mapping[str, Any], report: Report) -> dict[str, Any]:
+    """Study a gyro's or a stand's drift; see `app.services.drift.studying`."""
+    return studying.studied(payload, report)
 
 
 def _kept(

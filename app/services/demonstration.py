@@ -21,6 +21,7 @@ from app.exchange.si import parameter_lab
 from app.exchange.uncertainties import Statement
 from app.services import access, calibrations, gyros, ingest, stands
 from app.services.calibrations import TRIALS
+from app.services.drift import studying
 from app.services.lab import Lab, Person, Work
 from app.services.sessions import NewSession, find_session, open_session
 from app.services.simulated import (
@@ -100,6 +101,7 @@ def build(lab: Lab, now: datetime | None = None) -> None:
     """Fill an empty laboratory; one transaction, so that an interrupted build leaves nothing."""
     now = (now or datetime.now(UTC)).replace(microsecond=0)
     with lab.write(access.SYSTEM) as work:
+        work.queue = studying.NoJobs()
         for name, full_name, role in _PEOPLE:
             access.add_account(work, name, role, full_name=full_name)
         fleet = demonstration_fleet(SEED)
@@ -115,6 +117,7 @@ def build(lab: Lab, now: datetime | None = None) -> None:
             ]:
                 if solution is not None:
                     solution.store(work)
+        studying.follow_all_now(work)
         _leave_one_open(work, fleet[2], certified[-1][1], certified[-1][2], now)
 
 

@@ -5,7 +5,7 @@ from datetime import datetime
 
 from app.errors import Invalid, problem
 from app.exchange.si import PARAMETER_UNITS
-from app.services.gyros import find_gyro
+from app.services.finding import find_gyro
 from app.services.lab import Work
 from app.services.verdicts import coverage_factor, judge
 from app.services.views import HistoryPoint, HistorySeries

@@ -11,8 +11,8 @@ from app.services.views import JobView
 from app.store import results
 from app.store.tables import Job
 
-_PRIORITY: Final = {"calibrate": 10, "import": 30, "simulate": 50, "validate": 70}
-"""Lower runs first: a person waits for a calibration."""
+_PRIORITY: Final = {"calibrate": 10, "import": 30, "follow": 40, "simulate": 50, "validate": 70}
+"""Lower runs first: a person waits for a calibration, and what comes in together is studied together."""
 
 
 def submit(work: Work, kind: str, request: Mapping[str, Any], session_id: int | None) -> JobView:

@@ -12,6 +12,7 @@ from app.jobs.ledger import Task
 from app.jobs.problems import given_up
 from app.services import calibrations, ingest, simulations, validation
 from app.services.access import SYSTEM
+from app.services.drift import following, studying
 from app.services.job_views import stored_problem
 from app.services.lab import Lab, Person, Work
 from app.store import results
@@ -39,6 +40,9 @@ _KINDS: Final = {
     "simulate": _Kind("app.services.computing:simulate", simulations.prepare, simulations.store),
     validation.KIND: _Kind(
         "app.services.validating:validate", validation.prepare, validation.store, of_session=False
+    ),
+    following.KIND: _Kind(
+        "app.services.computing:follow", studying.prepare, studying.store, of_session=False
     ),
 }
 

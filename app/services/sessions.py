@@ -7,6 +7,7 @@ from typing import Any, cast
 
 from app.errors import Invalid, NotFound, problem
 from app.services import gyros, stands, verdicts
+from app.services.finding import find_gyro
 from app.services.job_views import job_view
 from app.services.lab import Work
 from app.services.live_views import Phase, RunBrief
@@ -52,7 +53,7 @@ def open_session(work: Work, new: NewSession) -> SessionView:
     Invalid
         No certificate of the stand is valid then.
     """
-    gyro, stand = gyros.find_gyro(work, new.gyro), stands.find_stand(work, new.stand)
+    gyro, stand = find_gyro(work, new.gyro), stands.find_stand(work, new.stand)
     started_at = new.started_at or work.now
     row = MeasuringSession(
         gyro=gyro, stand=stand, certificate=_certificate(work, new, started_at),

@@ -14,6 +14,11 @@ def gyro(db: Session, serial: str) -> Gyro | None:
     return db.scalar(sa.select(Gyro).where(Gyro.serial == serial))
 
 
+def gyro_by_id(db: Session, gyro_id: int) -> Gyro:
+    """The gyro of that number, which exists."""
+    return db.get_one(Gyro, gyro_id)
+
+
 def gyros(db: Session, *, type_name: str | None, after: str | None, limit: int) -> Sequence[Gyro]:
     """Gyros by serial number, those after `after`."""
     query = sa.select(Gyro).join(GyroType).order_by(Gyro.serial).limit(limit)

@@ -1,0 +1,79 @@
+"""Keeping the studies up with what comes in: told of every change, one job behind it.
+
+`changed` counts a change in the same transaction as the change itself, and enqueues the job that takes it
+in (`app.services.drift.studying`) unless one waits to begin already. The job reads the count with the data,
+so it knows what its study has seen: whatever comes in meanwhile leaves the study behind, and has a job of its
+own. A crash at any moment leaves the old study or the new one, and the job queue begins the job anew.
+
+A subject is a gyro, ``{"gyro": id}``, or a stand, ``{"stand": id}``: the request of a job of kind `KIND`.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Final
+
+from app.services import jobs
+from app.services.lab import Work
+from app.store import drift
+from app.store.tables import DriftStudy
+
+KIND: Final = "follow"
+Subject = Mapping[str, int]
+FOLLOWED: Final = ("gyro",)
+"""Kinds of subjects that are studied."""
+
+
+def changed(work: Work, gyro_id: int, *, methods: Iterable[str] = (), stand_id: int | None = None) -> None:
+    """Something came in for a gyro: a result by these methods, an event, a baseline, other limits.
+
+    Parameters
+    ----------
+    methods
+        Those that may be new to the gyro; every study that is there is counted anyway.
+    stand_id
+        The stand that a result came from: its study has to be made anew as well.
+    """
+    _count(work, {"gyro": gyro_id}, methods)
+    if stand_id is not None:
+        _count(work, {"stand": stand_id}, methods)
+
+
+def changed_stand(work: Work, stand_id: int) -> None:
+    """Something happened to a stand; its own study and those of the gyros measured there take it in."""
+    _count(work, {"stand": stand_id}, ())
+    for gyro_id in drift.gyros_on(work.db, stand_id):
+        _count(work, {"gyro": gyro_id}, ())
+
+
+def changed_type(work: Work, type_id: int) -> None:
+    """A type's limits or interval are others now."""
+    for gyro_id in drift.gyros_of_type(work.db, type_id):
+        _count(work, {"gyro": gyro_id}, ())
+
+
+def ids(subject: Subject) -> tuple[int | None, int | None]:
+    """The gyro's id and the stand's, one of them None."""
+    return subject.get("gyro"), subject.get("stand")
+
+
+def _count(work: Work, subject: Subject, methods: Iterable[str]) -> None:
+    """Count a change of every study of the subject; one job will take them all in."""
+    gyro_id, stand_id = ids(subject)
+    if not set(subject) <= set(FOLLOWED):
+        return
+    drift.locked(work.db, gyro_id, stand_id)
+    rows = list(drift.studies(work.db, gyro_id, stand_id))
+    for row in rows:
+        row.changed += 1
+    missing = set(methods) - {row.method for row in rows}
+    rows += [
+        DriftStudy(gyro_id=gyro_id, stand_id=stand_id, method=method, changed=1, studied=0)
+        for method in sorted(missing)
+    ]
+    if not rows:
+        return
+    work.db.add_all(rows)
+    known = {row.job_id for row in rows if row.job_id is not None}
+    waiting = drift.queued_job(work.db, sorted(known)) or jobs.submit(work, KIND, subject, None).id
+    for row in rows:
+        row.job_id = waiting
+    work.db.flush()

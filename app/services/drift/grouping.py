@@ -1,0 +1,105 @@
+"""Fewer points than sessions: means of a start, a day, a month or a year; the extremes of a long history.
+
+Within a group values are weighted by ``w_i = 1/u_i²``, u_i being the noise of each session's own currents, where it
+is known of all, and equally where it is not. The mean's u has two parts: of the noise, the larger of what the u_i
+predict, ``1/√Σw``, and of what the values show, ``√(Σw·(x − x̄)² / ((n − 1)·Σw))`` (R. T. Birge, Phys. Rev. 40 (1932)
+207, eqs. for internal and external consistency); and of what the sessions have in common, which a mean does not lessen.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import inf, sqrt
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.services.drift.series import Column, SeriesTable
+from solver.records import Array
+
+GROUPS: Final = ("session", "start", "day", "month", "year")
+_UNITS: Final = {"day": "D", "month": "M", "year": "Y"}
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Sessions taken together: the rows of the first and the last, how many, mean, u, k, standard deviation."""
+
+    first: int
+    last: int
+    sessions: int
+    value: float
+    u: float | None
+    k: float
+    scatter: float | None
+
+
+def grouped(table: SeriesTable, by: str, parameter: str) -> Iterator[Group]:
+    """Weighted means of a parameter by start, day, month or year (UTC), in the order of time."""
+    places = table.determined(parameter)
+    rows = table.rows(places)
+    for members in _members(_keys(rows, by)):
+        yield _mean(rows, parameter, members, int(places[members[0]]), int(places[members[-1]]))
+
+
+def _keys(table: SeriesTable, by: str) -> Column:
+    if by in ("session", "start"):
+        return table[by]
+    return table["measured_at"].astype(f"datetime64[{_UNITS[by]}]")
+
+
+def _members(keys: Column) -> list[NDArray[np.int64]]:
+    """Rows of each key, keys in the order of their first row."""
+    if not len(keys):
+        return []
+    _, first, which = np.unique(keys, return_index=True, return_inverse=True)
+    order = np.argsort(which, kind="stable")
+    parts = np.split(order, np.cumsum(np.bincount(which))[:-1])
+    return [parts[key] for key in np.argsort(first, kind="stable")]
+
+
+def _mean(table: SeriesTable, parameter: str, members: NDArray[np.int64], first: int, last: int) -> Group:
+    value, u, k, noise = (
+        np.asarray(table[f"{parameter}.{part}"][members], np.float64)
+        for part in ("value", "u", "k", "u_noise")
+    )
+    known = bool((np.isfinite(noise) & (noise > 0.0)).all())
+    weight = 1.0 / np.square(noise) if known else np.ones(len(value))
+    mean = float(np.sum(weight * value) / np.sum(weight))
+    count = len(value)
+    external = _external(value, weight, mean)
+    internal = 1.0 / sqrt(float(np.sum(weight))) if known else 0.0
+    common = np.square(u) - (np.square(noise) if known else 0.0)
+    return Group(
+        first, last, count, mean,
+        None if np.isnan(u).any() else sqrt(max(internal, external) ** 2 + max(float(np.mean(common)), 0.0)),
+        float(np.mean(k)), float(np.std(value, ddof=1)) if count > 1 else None,
+    )  # fmt: skip
+
+
+def _external(value: Array, weight: Array, mean: float) -> float:
+    """Standard uncertainty of the mean as the values' own scatter shows it."""
+    if len(value) < 2:
+        return 0.0
+    squares = float(np.sum(weight * np.square(value - mean)))
+    return sqrt(squares / ((len(value) - 1) * float(np.sum(weight))))
+
+
+def reduced(table: SeriesTable, parameter: str, most: int) -> NDArray[np.int64]:
+    """Rows that show a parameter in at most `most` points: of equal spans of time the lowest and the highest.
+
+    The first and the last row stay; every extreme of the whole is among them.
+    """
+    places = table.determined(parameter)
+    if len(places) <= most:
+        return places
+    times = table["measured_at"][places].astype(np.int64)
+    bins = max(1, (most - 2) // 2)
+    span = float(times[-1] - times[0]) or inf
+    which = np.minimum(((times - times[0]) / span * bins).astype(np.int64), bins - 1)
+    value = np.asarray(table[f"{parameter}.value"][places], np.float64)
+    kept = {0, len(places) - 1}
+    for extreme in (value, -value):
+        order = np.lexsort((extreme, which))
+        kept |= set(order[np.flatnonzero(np.diff(which[order], prepend=-1))].tolist())
+    return places[np.array(sorted(kept), np.int64)]

@@ -1,0 +1,172 @@
+"""What a page or a call asks of a gyro's drift: a period, a grouping, some parameters; from the stored study alone."""
+
+import json
+from collections.abc import Iterator, Sequence
+from datetime import datetime
+from typing import Any, Final
+
+import numpy as np
+
+from app.errors import Invalid, problem
+from app.exchange.si import PARAMETER_UNITS
+from app.services.drift import alarms, baselines, events, grouping, series
+from app.services.drift.series import SeriesTable, aware
+from app.services.drift.views import DriftPoint, GyroDrift, ParameterDrift
+from app.services.finding import find_gyro
+from app.services.job_views import job_view
+from app.services.lab import Work
+from app.services.verdicts import judge
+from app.store import drift, results
+from app.store.tables import DriftStudy, Gyro
+from solver.records import PARAMETERS
+
+METHODS: Final = ("least-squares", "generalised", "robust", "paper")
+MOST_POINTS: Final = 200
+"""Of one chart: as many as a page's width shows apart."""
+
+
+def gyro_drift(
+    work: Work,
+    serial: str,
+    *,
+    method: str = "least-squares",
+    parameters: Sequence[str] = PARAMETERS,
+    since: datetime | None = None,
+    until: datetime | None = None,
+    by: str = "session",
+    most: int | None = MOST_POINTS,
+) -> GyroDrift:
+    """A gyro's drift by one method: what was found, and the points of a period.
+
+    Parameters
+    ----------
+    parameters
+        Which, and in which order.
+    since, until
+        Of the period, both included; None for the beginning and the end.
+    by
+        What a point stands for: session, start, day, month or year.
+    most
+        Points of each parameter at the most; None for all.
+
+    Raises
+    ------
+    NotFound
+        An unknown gyro.
+    Invalid
+        An unknown parameter, method or grouping.
+    """
+    _check(method, parameters, by)
+    gyro = find_gyro(work, serial)
+    studies = drift.studies(work.db, gyro.id, None)
+    row = next((item for item in studies if item.method == method), None)
+    made = row is not None and row.document is not None
+    table = series.decode(row.series) if row is not None and row.series is not None else None
+    document = json.loads(row.document) if row is not None and row.document is not None else None
+    shown = None if table is None else table.between(since, until)
+    found = [] if shown is None else [*events.derived(shown, serial)]
+    found += [
+        item
+        for item in events.of_gyro(work, serial)
+        if (since is None or item.at >= since) and (until is None or item.at <= until)
+    ]
+    return GyroDrift(
+        gyro=serial, type=gyro.type.name, method=method, methods=tuple(item.method for item in studies),
+        by=by, up_to_date=row is None or row.studied >= row.changed,
+        studied_at=row.studied_at if row else None, solver_version=row.solver_version if row else None,
+        job=_job(work, row), sessions=0 if table is None else len(table),
+        since=None if not made or table is None or not len(table) else aware(table["measured_at"][0]),
+        until=None if not made or table is None or not len(table) else aware(table["measured_at"][-1]),
+        document=document,
+        parameters=tuple(_parameter(gyro, name, shown, document, by, most) for name in parameters),
+        events=tuple(sorted(found, key=lambda item: item.at)),
+        baselines=baselines.of_gyro(work, serial, method=method),
+        alarms=alarms.alarms(work, gyro=serial, method=method),
+    )  # fmt: skip
+
+
+def _check(method: str, parameters: Sequence[str], by: str) -> None:
+    if method not in METHODS:
+        raise Invalid(problem("unknown-method", "There is no method “%(method)s”. Choose one of %(methods)s.",
+                              column="method", method=method, methods=", ".join(METHODS)))  # fmt: skip
+    for name in parameters:
+        if name not in PARAMETERS:
+            raise Invalid(problem("unknown-parameter",
+                                  "There is no parameter “%(name)s”; choose among %(names)s.",
+                                  column="parameter", name=name, names=", ".join(PARAMETERS)))  # fmt: skip
+    if by not in grouping.GROUPS:
+        raise Invalid(problem("unknown-grouping", "There is no grouping “%(name)s”; choose among %(names)s.",
+                              column="by", name=by, names=", ".join(grouping.GROUPS)))  # fmt: skip
+
+
+def _job(work: Work, row: DriftStudy | None) -> Any:
+    job = None if row is None or row.job_id is None else results.job(work.db, row.job_id)
+    return None if job is None else job_view(job)
+
+
+def _parameter(
+    gyro: Gyro,
+    name: str,
+    table: SeriesTable | None,
+    document: dict[str, Any] | None,
+    by: str,
+    most: int | None,
+) -> ParameterDrift:
+    limits = next((item for item in gyro.type.limits if item.parameter == name), None)
+    low, high = (limits.low, limits.high) if limits else (None, None)
+    places = np.array([], np.int64) if table is None else table.determined(name)
+    points: list[DriftPoint] = []
+    if table is not None and by == "session":
+        kept = places if most is None else grouping.reduced(table, name, most)
+        points = list(_points(table.rows(kept), name, low, high))
+    elif table is not None:
+        points = list(_groups(table, name, by, low, high))
+        points = points if most is None else points[-most:]
+    return ParameterDrift(
+        parameter=name, unit=PARAMETER_UNITS[name][0], low=low, high=high,
+        repeatability=limits.repeatability if limits else None, sessions=len(places),
+        reduced=by == "session" and len(points) < len(places), points=tuple(points),
+        study=None if document is None else document["parameters"].get(name),
+    )  # fmt: skip
+
+
+def _points(table: SeriesTable, name: str, low: float | None, high: float | None) -> Iterator[DriftPoint]:
+    charts = {
+        column.removeprefix(f"{name}."): table[column].tolist()
+        for column in table.columns
+        if column.startswith(f"{name}.") and column.removeprefix(f"{name}.") not in (*series.PARTS, "signals")
+    }
+    signals = table.columns.get(f"{name}.signals")
+    columns = {part: table[f"{name}.{part}"].tolist() for part in series.PARTS}
+    heads = {
+        part: table[part].tolist()
+        for part in ("calibration", "session", "start", "stand", "certificate", "revisions")
+    }
+    for place in range(len(table)):
+        value, k = columns["value"][place], columns["k"][place]
+        u = _known(columns["u"][place])
+        at = aware(table["measured_at"][place])
+        yield DriftPoint(
+            **{part: column[place] for part, column in heads.items()}, at=at, until=at, sessions=1,
+            value=value, u=u, k=k, scatter=None, verdict=judge(value, u, low, high, k),
+            charts={chart: _known(column[place]) for chart, column in charts.items()},
+            signals=tuple(signals[place].split()) if signals is not None else (),
+        )  # fmt: skip
+
+
+def _groups(
+    table: SeriesTable, name: str, by: str, low: float | None, high: float | None
+) -> Iterator[DriftPoint]:
+    for group in grouping.grouped(table, by, name):
+        yield DriftPoint(
+            calibration=int(table["calibration"][group.last]), session=int(table["session"][group.last]),
+            at=aware(table["measured_at"][group.first]), until=aware(table["measured_at"][group.last]),
+            sessions=group.sessions, start=int(table["start"][group.last]), stand=str(table["stand"][group.last]),
+            certificate=str(table["certificate"][group.last]), revisions=int(table["revisions"][group.last]),
+            value=group.value, u=group.u, k=group.k, scatter=group.scatter,
+            verdict=judge(group.value, group.u, low, high, group.k), charts={}, signals=(),
+        )  # fmt: skip
+
+
+def _known(number: float) -> float | None:
+    return None if number != number else number
