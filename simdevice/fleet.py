@@ -1,13 +1,17 @@
 """Gyros that age: the truth of an individual as a function of time and of its starts.
 
-    truth(time, start) = at birth + drift·time + every jump up to that time + scatter of the start
+    truth(time, start) = at birth + drift·time + ageing + every jump up to that time + scatter of the start
+
+with each ageing = change·(1 − exp(−time/T)).
 
 Time is in seconds since the history's beginning; starts are numbered power-ups.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
+
+import numpy as np
 
 from simdevice.ammeter import Ammeter
 from simdevice.bench import Bench
@@ -32,6 +36,19 @@ class Jump:
 
 
 @dataclass(frozen=True, slots=True)
+class Ageing:
+    """Some parameters settle exponentially by `changes`, with a time constant, s."""
+
+    time_constant: float
+    changes: Mapping[str, float]
+
+    def until(self, time: float) -> dict[str, float]:
+        """Change up to a time, s."""
+        share = -np.expm1(-time / self.time_constant)
+        return {name: float(change * share) for name, change in self.changes.items()}
+
+
+@dataclass(frozen=True, slots=True)
 class FleetGyro:
     """One gyro of a laboratory, with its whole life.
 
@@ -47,6 +64,8 @@ class FleetGyro:
         Linear change, by parameter, SI per second.
     jumps
         Steps.
+    ageing
+        What settles over the months.
     """
 
     serial: str
@@ -55,10 +74,13 @@ class FleetGyro:
     seed: int
     drift: Mapping[str, float] = field(default_factory=dict)
     jumps: tuple[Jump, ...] = ()
+    ageing: tuple[Ageing, ...] = ()
 
     def settled(self, time: float) -> Gyro:
         """Parameters at a time, s, without a start's scatter: what a history's trend should find."""
         gyro = self.birth.shifted({name: slope * time for name, slope in self.drift.items()})
+        for settling in self.ageing:
+            gyro = gyro.shifted(settling.until(time))
         for jump in self.jumps:
             if jump.time <= time:
                 gyro = gyro.shifted(jump.changes)
@@ -89,19 +111,34 @@ class FleetGyro:
         )
 
 
+REPAIRED: Final = ("0419", 150 * DAY)
+"""The gyro of the demonstration that is repaired, and when, s."""
+
+
 def demonstration_fleet(seed: int) -> tuple[FleetGyro, ...]:
-    """Six gyros of two types for a year: 0417 drifts, 0423 jumps on day 210, the others are steady."""
+    """Six gyros of two types for a year, each with a story that a drift history should tell.
+
+    0412 is steady, and checks the stand; 0417 drifts, its ωк towards a limit; 0419 is repaired
+    (`REPAIRED`); 0423 jumps on day 210; D-031 ages exponentially; D-034 differs much from start to start.
+    """
     dph = rad_per_s_from_deg_per_h
-    lives: tuple[tuple[str, GyroType, dict[str, float], tuple[Jump, ...]], ...] = (
-        ("0412", GVK_6, {}, ()),
-        ("0417", GVK_6, {"w0x": dph(0.6) / YEAR, "wg": dph(0.4) / YEAR}, ()),
-        ("0419", GVK_6, {}, ()),
-        ("0423", GVK_6, {}, (Jump(210 * DAY, {"wk": dph(0.5), "w0y": dph(-0.4)}),)),
-        ("D-031", DTG_4, {}, ()),
-        ("D-034", DTG_4, {}, ()),
-    )
-    fleet = []
-    for number, (serial, kind, drift, jumps) in enumerate(lives):
-        own = derived_seed(seed, Part.FLEET_SEED, number)
-        fleet.append(FleetGyro(serial, kind, draw_gyro(kind, own), own, drift, jumps))
-    return tuple(fleet)
+    restless = replace(DTG_4, start_scatter={name: 4 * u for name, u in DTG_4.start_scatter.items()})
+    repair = Jump(REPAIRED[1], {"w0x": dph(0.3), "wg": dph(-0.2), "wk": dph(0.15)})
+    jump = Jump(210 * DAY, {"wk": dph(0.5), "w0y": dph(-0.4)})
+    fleet = (
+        FleetGyro("0412", *_born(GVK_6, seed, 0)),
+        FleetGyro(
+            "0417", *_born(GVK_6, seed, 1),
+            drift={"w0x": dph(0.6) / YEAR, "wg": dph(0.4) / YEAR, "wk": dph(0.085) / YEAR},
+        ),
+        FleetGyro(REPAIRED[0], *_born(GVK_6, seed, 2), jumps=(repair,)),
+        FleetGyro("0423", *_born(GVK_6, seed, 3), jumps=(jump,)),
+        FleetGyro("D-031", *_born(DTG_4, seed, 4), ageing=(Ageing(60 * DAY, {"w0y": dph(-1.5)}),)),
+        FleetGyro("D-034", *_born(DTG_4, seed, 5)),
+    )  # fmt: skip
+    return (*fleet[:5], replace(fleet[5], kind=restless))
+
+
+def _born(kind: GyroType, seed: int, number: int) -> tuple[GyroType, Gyro, int]:
+    own = derived_seed(seed, Part.FLEET_SEED, number)
+    return kind, draw_gyro(kind, own), own

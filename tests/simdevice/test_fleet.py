@@ -4,8 +4,8 @@ from scipy.stats import chi2
 
 from simdevice.bench import mean_currents
 from simdevice.certificate import draw_certificate, sixteen_positions
-from simdevice.fleet import DAY, YEAR, FleetGyro, Jump, demonstration_fleet
-from simdevice.scenarios import GVK_6
+from simdevice.fleet import DAY, REPAIRED, YEAR, Ageing, FleetGyro, Jump, demonstration_fleet
+from simdevice.scenarios import DTG_4, GVK_6
 from simdevice.stand import Stand
 
 GYRO = FleetGyro(
@@ -63,23 +63,45 @@ def test_sessions_of_one_start_differ_in_noise_only() -> None:
     assert np.abs(difference).max() < 6 * np.sqrt(2) * 1.13e-9
 
 
+def test_ageing_settles_with_its_time_constant() -> None:
+    gyro = FleetGyro("1", GVK_6, GVK_6.nominal, 4, ageing=(Ageing(50 * DAY, {"w0y": -2e-6}),))
+    birth = GVK_6.nominal.w0y
+    # 1 − 1/e of the change after one time constant, all of it in the end; differences of 1e-6: rounding.
+    assert gyro.settled(0.0).w0y == birth
+    assert gyro.settled(50 * DAY).w0y - birth == pytest.approx(-2e-6 * 0.6321205588285577, rel=1e-9)
+    assert gyro.settled(100 * YEAR).w0y - birth == pytest.approx(-2e-6, rel=1e-9)
+
+
 def test_the_demonstration_fleet_is_six_gyros_of_two_types_with_their_stories() -> None:
-    fleet = demonstration_fleet(1)
-    assert len({gyro.serial for gyro in fleet}) == 6
-    assert sorted(gyro.kind.name for gyro in fleet) == ["DTG-4"] * 2 + ["GVK-6"] * 4
-    assert [gyro.serial for gyro in fleet if gyro.drift] == ["0417"]
-    assert [gyro.serial for gyro in fleet if gyro.jumps] == ["0423"]
-    for gyro in fleet:
-        moved = gyro.settled(YEAR).values - gyro.settled(0.0).values
-        assert bool(moved.any()) == (gyro.serial in {"0417", "0423"})
+    fleet = {gyro.serial: gyro for gyro in demonstration_fleet(1)}
+    assert sorted(gyro.kind.name for gyro in fleet.values()) == ["DTG-4"] * 2 + ["GVK-6"] * 4
+    changed = {
+        serial: {
+            name
+            for name in ("kx", "ky", "kxy", "kyx", "w0x", "w0y", "wg", "wk")
+            if getattr(gyro.settled(YEAR), name) != getattr(gyro.settled(0.0), name)
+        }
+        for serial, gyro in fleet.items()
+    }
+    assert changed == {
+        "0412": set(), "0417": {"w0x", "wg", "wk"}, "0419": {"w0x", "wg", "wk"}, "0423": {"w0y", "wk"},
+        "D-031": {"w0y"}, "D-034": set(),
+    }  # fmt: skip
     # Changes that a calibration sees: well beyond the start-to-start scatter.
-    drifting, jumping = fleet[1], fleet[3]
+    drifting, repaired, jumping, ageing, restless = list(fleet.values())[1:]
     assert drifting.settled(YEAR).w0x - drifting.birth.w0x > 10 * GVK_6.start_scatter["w0x"]
+    assert (
+        repaired.settled(REPAIRED[1]).w0x - repaired.settled(REPAIRED[1] - 1).w0x
+        > 5 * GVK_6.start_scatter["w0x"]
+    )
     assert jumping.settled(YEAR).wk - jumping.birth.wk > 10 * GVK_6.start_scatter["wk"]
+    assert ageing.birth.w0y - ageing.settled(YEAR).w0y > 10 * DTG_4.start_scatter["w0y"]
+    assert restless.kind.start_scatter["w0x"] > 3 * DTG_4.start_scatter["w0x"]
 
 
 def test_gyros_of_a_fleet_are_individuals_and_repeatable() -> None:
     fleet = demonstration_fleet(1)
     assert len({gyro.birth for gyro in fleet}) == 6
+    assert len({gyro.seed for gyro in fleet}) == 6
     assert fleet == demonstration_fleet(1)
     assert fleet[0].birth != demonstration_fleet(2)[0].birth
