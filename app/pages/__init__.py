@@ -16,11 +16,15 @@ from fastapi import APIRouter, FastAPI
 from fastapi.staticfiles import StaticFiles
 
 from app.pages import (
+    alarms,
     assets,
     certificates,
     choices,
+    compare,
     entry,
     errors,
+    events,
+    fleet,
     gyros,
     history,
     jobs,
@@ -46,8 +50,8 @@ __all__ = ["errors", "mount", "router"]
 
 router = APIRouter(include_in_schema=False)
 for _noun in (
-    today, sessions, session_files, entry, live, results, measurements, gyros, history, types, stands, planning,
-    uncertainty, certificates, simulations, jobs, method, loop, validation, sign_in, choices, assets,
+    today, sessions, session_files, entry, live, results, measurements, gyros, history, events, alarms, types,
+    fleet, compare, stands, planning, uncertainty, certificates, simulations, jobs, method, loop, validation, sign_in, choices, assets,
 ):  # fmt: skip
     router.include_router(_noun.router)
 

@@ -25,6 +25,7 @@ from app import figures, i18n
 from app.errors import Unauthenticated, problem
 from app.pages import labels
 from app.services import access, overview, stands
+from app.services.drift import alarms
 from app.services.lab import Lab, Person
 
 STATIC: Final = Path(__file__).parents[1] / "static"
@@ -96,9 +97,10 @@ environment: Final = _environment()
 def render(request: Request, template: str, /, *, status: int = 200, **context: Any) -> HTMLResponse:
     """A whole page, with navigation for whoever is signed in."""
     person: Person | None = getattr(request.state, "person", None)
+    stands_now, open_alarms = _navigation(request, person)
     html = environment.get_template(template).render(
-        request=request, person=person, theme=theme_of(request), stands_now=_stands_now(request, person),
-        here=_address(request), **context,
+        request=request, person=person, theme=theme_of(request), stands_now=stands_now,
+        open_alarms=open_alarms, here=_address(request), **context,
     )  # fmt: skip
     return HTMLResponse(html, status_code=status, headers={"vary": "Cookie, Accept-Language"})
 
@@ -114,11 +116,13 @@ def _address(request: Request) -> str:
     return request.url.path + query
 
 
-def _stands_now(request: Request, person: Person | None) -> tuple[overview.StandNow, ...]:
+def _navigation(request: Request, person: Person | None) -> tuple[tuple[overview.StandNow, ...], int]:
+    """What each stand does now, and how many alarms are open."""
     if person is None:
-        return ()
+        return (), 0
     with lab_of(request).read(person) as work:
-        return overview.stands_now(work, tuple(stand.name for stand in stands.stands(work)))
+        names = tuple(stand.name for stand in stands.stands(work))
+        return overview.stands_now(work, names), sum(alarms.counts(work).values())
 
 
 def theme_of(request: Request) -> str | None:

@@ -1,171 +1,188 @@
-"""A gyro's history: every parameter over time with its uncertainty, limits and changes of certificate."""
+"""A gyro's history: control charts, alarms and events, repeatability, trend, and every value."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
-from itertools import pairwise
-from typing import Final, Literal
+from datetime import UTC, date, datetime, time, timedelta
+from typing import Annotated, Any, Final, Literal
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
 
-from app import plots
-from app.figures import day, measured, plain
-from app.i18n import gettext
-from app.pages import labels
+from app.figures import measured
+from app.pages import drift_labels, drift_panels, drift_tables, drift_words
+from app.pages.alarms import may_judge
 from app.pages.base import Reader, TheLab, render
-from app.pages.result_view import limit_text
-from app.pages.tables import Row, csv_answer, json_answer
-from app.services import gyros, history, session_index
-from app.services.views import HistoryPoint, HistorySeries
+from app.pages.drift_panels import ORDER, SOLID
+from app.pages.tables import Row, csv_answer, json_answer, parquet_answer
+from app.services import gyros, sessions
+from app.services.drift import alarms, due, events, grouping, reading
+from app.services.drift.alarms import CAUSES
+from app.services.drift.views import DriftPoint, EventView, GyroDrift, ParameterDrift
+from app.services.lab import Work
 
 router = APIRouter()
 
-PERIODS: Final = {"quarter": 92, "half": 183, "year": 366, "all": None}
+PERIODS: Final = {"quarter": 92, "year": 366, "three": 1097, "all": None}
 """Choices of the period, in days back from today."""
-Period = Literal["quarter", "half", "year", "all"]
+Period = Literal["quarter", "year", "three", "repair", "all"]
 Method = Literal["least-squares", "paper"]
-
-_ORDER: Final = ("w0x", "w0y", "wg", "wk", "kx", "ky", "kxy", "kyx")
-_STATES: Final[dict[str, Literal["within", "conditional", "beyond"]]] = {
-    "fails": "beyond",
-    "conditional": "conditional",
-}
+Group = Literal["session", "start", "day", "month", "year"]
+_MOST_ROWS: Final = 50
+_SESSIONS: Final = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Panel:
-    """One parameter: its series, its chart, and the latest value."""
+class View:
+    """What of a history is wanted: a period by its name or by its days, a grouping, a method."""
 
-    series: HistorySeries
-    spec: plots.theme.Spec
-    latest: HistoryPoint | None
-    limit: str
+    period: Period = "year"
+    begin: Annotated[date | None, Query(alias="from")] = None
+    until: date | None = None
+    by: Group = "session"
+    method: Method = "least-squares"
+
+
+Wanted = Annotated[View, Depends()]
 
 
 @router.get("/gyros/{serial}")
-def page(
-    request: Request, person: Reader, lab: TheLab, serial: str, period: Period = "year",
-    method: Method = "least-squares",
-) -> Response:  # fmt: skip
+def page(request: Request, person: Reader, lab: TheLab, serial: str, wanted: Wanted) -> Response:
     """The drift of one gyro."""
     now = datetime.now(UTC)
     with lab.read(person) as work:
         gyro = gyros.gyro(work, serial)
-        found = history.history(work, serial, since=_since(period, now), method=method)
-        index = session_index.find(work, gyro=serial, limit=12)
-    series = sorted(found, key=lambda item: _ORDER.index(item.parameter))
+        repaired = last_repair(events.of_gyro(work, serial))
+        since, until = bounds(wanted, repaired, now)
+        found = reading.gyro_drift(
+            work, serial, method=wanted.method, parameters=ORDER, since=since, until=until, by=wanted.by
+        )
+        known = alarms.alarms(work, gyro=serial, method=wanted.method, state=None)
+        rows = _newest(work, serial, wanted, found, since, until)
+        latest = sessions.sessions(work, gyro=serial, limit=_SESSIONS)
+        holds = due.due_of(work, [serial]).get(serial)
+    window = drift_panels.window_of(found, since, until, now)
     return render(
-        request, "history/page.html", gyro=gyro, period=period, periods=PERIODS, method=method,
-        panels=list(_panels(series, period, now)), index=index, rows=list(_by_session(series)),
-        order=_ORDER, events=_events(series), measured=measured,
+        request, "history/page.html", gyro=gyro, found=found, alarms=known, period=chosen(wanted),
+        periods=choices(repaired), method=wanted.method, by=wanted.by, groups=grouping.GROUPS,
+        panels=list(drift_panels.panels(found, window)), rows=rows, total=_results(found.parameters), order=ORDER,
+        ahead=any((item.study or {}).get("forecast") for item in found.parameters), repaired=window.breaks,
+        bases=drift_tables.bases(found), trends=drift_tables.trends(found), latest=latest, due=holds,
+        repeatability=drift_tables.repeatability(found), interval=(found.document or {}).get("interval"),
+        judges=may_judge(person), may_write="upload" in person.scopes, now=now, today=now.date(), causes=CAUSES,
+        drift=drift_labels, words=drift_words, measured=measured,
     )  # fmt: skip
+
+
+@router.get("/gyros/{serial}/study")
+def study(person: Reader, lab: TheLab, serial: str, method: Method = "least-squares") -> Response:
+    """Whether the study has caught up: nothing while it has not, then htmx is told to show the page anew."""
+    with lab.read(person) as work:
+        found = reading.gyro_drift(work, serial, method=method, parameters=(), by="session", most=1)
+    if not found.up_to_date:
+        return Response(status_code=204)
+    return Response(headers={"HX-Refresh": "true"})
 
 
 @router.get("/gyros/{serial}/history.{form}")
 def exported(
-    person: Reader, lab: TheLab, serial: str, form: Literal["csv", "json"], period: Period = "all",
-    method: Method = "least-squares",
+    person: Reader, lab: TheLab, serial: str, form: Literal["csv", "json", "parquet"], wanted: Wanted,
 ) -> Response:  # fmt: skip
-    """The same values as a file: one row for each parameter of each session."""
+    """The same values as a file: one row for each parameter of each session, or of each group."""
     with lab.read(person) as work:
-        found = history.history(work, serial, since=_since(period, datetime.now(UTC)), method=method)
-    rows = [_row(serial, series, point) for series in found for point in series.points]
+        since, until = bounds(wanted, last_repair(events.of_gyro(work, serial)), datetime.now(UTC))
+        found = reading.gyro_drift(
+            work,
+            serial,
+            method=wanted.method,
+            parameters=ORDER,
+            since=since,
+            until=until,
+            by=wanted.by,
+            most=None,
+        )
+    rows = [_row(found, item, point) for item in found.parameters for point in item.points]
     if form == "json":
         return json_answer(rows)
-    return csv_answer(rows, _COLUMNS, f"history-{serial}")
+    answer = csv_answer if form == "csv" else parquet_answer
+    return answer(rows, _COLUMNS, f"history-{serial}")
 
 
-def _since(period: Period, now: datetime) -> datetime | None:
-    days = PERIODS[period]
-    return None if days is None else now - timedelta(days=days)
+@router.get("/gyros/{serial}/repeatability.csv")
+def scatter(person: Reader, lab: TheLab, serial: str, method: Method = "least-squares") -> Response:
+    """The variance components with every digit."""
+    with lab.read(person) as work:
+        rows = [_component(serial, item) for item in reading.components(work, serial, method=method)]
+    return csv_answer(rows, _SCATTER_COLUMNS, f"repeatability-{serial}")
 
 
-def _panels(series: Sequence[HistorySeries], period: Period, now: datetime) -> Iterator[Panel]:
-    moments = [point.measured_at for item in series for point in item.points]
-    begin = _since(period, now) or min(moments, default=now)
-    spare = max(timedelta(days=1), (now - begin) * 0.02)
-    window = (begin - spare, max([now, *moments]) + spare)
-    events = [
-        plots.DriftEvent(moment, label)
-        for moment, label in _events(series)
-        if window[0] <= moment <= window[1]
-    ]
-    for item in series:
-        latest = item.points[-1] if item.points else None
-        # Events are named once, above the first panel; their line goes through all.
-        named = events if item is series[0] else [plots.DriftEvent(event.moment, "") for event in events]
-        spec = plots.drift(
-            [_point(item, point) for point in item.points if point.value is not None],
-            named,
-            list(_limits(item)),
-            window,
-            gettext("%(parameter)s by session, %(count)d values, with expanded uncertainty")
-            % {"parameter": labels.parameter(item.parameter), "count": len(item.points)},
-            with_dates=item is series[-1],
+def last_repair(known: tuple[EventView, ...]) -> datetime | None:
+    """When the gyro last became another one."""
+    return max((item.at for item in known if item.kind in SOLID and item.gyro), default=None)
+
+
+def choices(repaired: datetime | None) -> tuple[str, ...]:
+    """Periods to choose from."""
+    return (*PERIODS, "repair") if repaired else tuple(PERIODS)
+
+
+def chosen(wanted: View) -> str:
+    """The period's name; empty when days are given."""
+    return "" if wanted.begin or wanted.until else wanted.period
+
+
+def bounds(wanted: View, repaired: datetime | None, now: datetime) -> tuple[datetime | None, datetime | None]:
+    """Beginning and end of the period, None where it is open."""
+    if wanted.begin or wanted.until:
+        return _midnight(wanted.begin), _midnight(wanted.until and wanted.until + timedelta(days=1))
+    if wanted.period == "repair":
+        return repaired, None
+    days = PERIODS[wanted.period]
+    return None if days is None else now - timedelta(days=days), None
+
+
+def _midnight(day: date | None) -> datetime | None:
+    return None if day is None else datetime.combine(day, time(), UTC)
+
+
+def _results(parameters: tuple[ParameterDrift, ...]) -> int:
+    return max((item.sessions for item in parameters), default=0)
+
+
+def _newest(
+    work: Work, serial: str, wanted: View, found: GyroDrift, since: datetime | None, until: datetime | None
+) -> list[tuple[DriftPoint, dict[str, DriftPoint]]]:
+    """The table behind the charts; where the charts show fewer points than sessions, read for itself."""
+    if wanted.by != "session" or any(item.reduced for item in found.parameters):
+        newest = sessions.sessions(work, gyro=serial, until=until, limit=_MOST_ROWS).items
+        since = max(
+            (item for item in (since, *(one.started_at for one in newest[-1:])) if item), default=None
         )
-        yield Panel(item, spec, latest, limit_text(item.low, item.high))
-
-
-def _limits(item: HistorySeries) -> Iterator[plots.DriftLimit]:
-    for value, side in ((item.low, "below"), (item.high, "above")):
-        if value is not None:
-            text = gettext("limit %(value)s") % {"value": plain(value)}
-            yield plots.DriftLimit(value, "below" if side == "below" else "above", text)
-
-
-def _point(item: HistorySeries, point: HistoryPoint) -> plots.DriftPoint:
-    name = gettext("%(day)s, session %(session)d: %(value)s %(unit)s") % {
-        "day": day(point.measured_at), "session": point.session, "value": measured(point.value, point.expanded),
-        "unit": labels.unit(item.unit),
-    }  # fmt: skip
-    state = _STATES.get(point.verdict, "within")
-    return plots.DriftPoint(
-        point.measured_at,
-        point.value or 0.0,
-        point.expanded,
-        state,
-        name,
-        "",
-        f"/results/{point.calibration}",
-    )
-
-
-def _events(series: Sequence[HistorySeries]) -> list[tuple[datetime, str]]:
-    """When a session first used another certificate than the session before: (moment, its number)."""
-    points = max((item.points for item in series), key=len, default=())
-    found = []
-    for before, now in pairwise(points):
-        if (before.stand, before.certificate) != (now.stand, now.certificate):
-            between = before.measured_at + (now.measured_at - before.measured_at) / 2
-            found.append(
-                (between, now.certificate if before.stand == now.stand else f"{now.stand} {now.certificate}")
-            )
-    return found
-
-
-def _by_session(series: Sequence[HistorySeries]) -> Iterator[tuple[HistoryPoint, dict[str, HistoryPoint]]]:
-    """The table behind the charts: of each result every parameter's point, the newest first."""
-    found: dict[int, dict[str, HistoryPoint]] = {}
-    for item in series:
-        for point in item.points:
-            found.setdefault(point.calibration, {})[item.parameter] = point
-    rows = [(next(iter(values.values())), values) for values in found.values()]
-    yield from sorted(rows, key=lambda row: row[0].measured_at, reverse=True)
+        found = reading.gyro_drift(
+            work, serial, method=wanted.method, parameters=ORDER, since=since, until=until, most=None
+        )
+    return drift_tables.by_session(found.parameters, _MOST_ROWS)
 
 
 _COLUMNS: Final = (
-    "gyro", "measured_at", "session", "start", "stand", "certificate", "result", "parameter", "value",
-    "standard_uncertainty", "expanded_uncertainty", "coverage_factor", "unit", "low", "high", "verdict",
+    "gyro", "measured_at", "until", "sessions", "session", "start", "stand", "certificate", "result", "revision",
+    "parameter", "value", "standard_uncertainty", "expanded_uncertainty", "coverage_factor",
+    "standard_deviation", "unit", "low", "high", "verdict", "signals",
+)  # fmt: skip
+_SCATTER_COLUMNS: Final = (
+    "gyro", "parameter", "unit", "source", "sd", "low", "high", "dof", "f", "p_value", "confounded_with",
 )  # fmt: skip
 
 
-def _row(serial: str, series: HistorySeries, point: HistoryPoint) -> Row:
+def _row(found: GyroDrift, item: ParameterDrift, point: DriftPoint) -> Row:
     return {
-        "gyro": serial, "measured_at": point.measured_at.astimezone(UTC), "session": point.session,
-        "start": point.start, "stand": point.stand, "certificate": point.certificate,
-        "result": point.calibration, "parameter": series.parameter, "value": point.value,
-        "standard_uncertainty": point.u,
-        "expanded_uncertainty": point.expanded,
-        "coverage_factor": point.k, "unit": series.unit, "low": series.low, "high": series.high,
-        "verdict": point.verdict,
+        "gyro": found.gyro, "measured_at": point.at, "until": point.until, "sessions": point.sessions,
+        "session": point.session, "start": point.start, "stand": point.stand, "certificate": point.certificate,
+        "result": point.calibration, "revision": point.revisions, "parameter": item.parameter,
+        "value": point.value, "standard_uncertainty": point.u, "expanded_uncertainty": point.expanded,
+        "coverage_factor": point.k, "standard_deviation": point.scatter, "unit": item.unit, "low": item.low,
+        "high": item.high, "verdict": point.verdict, "signals": " ".join(point.signals),
     }  # fmt: skip
+
+
+def _component(serial: str, part: Mapping[str, Any]) -> Row:
+    known = {name: part.get(name) for name in _SCATTER_COLUMNS}
+    return {**known, "gyro": serial, "confounded_with": " ".join(part.get("confounded_with") or ())}

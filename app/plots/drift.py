@@ -182,7 +182,7 @@ def template(with_dates: bool, step: int) -> Spec:
         )
 
     def named(name: str, look: Spec, height: Any, **place: Any) -> Any:
-        return rows(name).mark_text(**look, align="left", dx=4, aria=False, **place).encode(
+        return rows(name).transform_filter("datum.text").mark_text(**look, align="left", dx=4, aria=False, **place).encode(
             x=x(), y=height, text="text:N"
         )  # fmt: skip
 

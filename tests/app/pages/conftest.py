@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from datetime import date, timedelta
 from pathlib import Path
 
+import drift_laboratory
 import pytest
 from fastapi import FastAPI
 from fastapi.exceptions import RequestValidationError
@@ -64,13 +65,26 @@ def cancelled(queue: Notebook) -> list[str]:
 
 @pytest.fixture(scope="session")
 def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A database with its tables and two accounts, to be copied: hashing a password is slow on purpose."""
-    settings = Settings(data=tmp_path_factory.mktemp("prepared"))
+    """A database with its tables and accounts, to be copied: hashing a password is slow on purpose."""
+    return _made(tmp_path_factory.mktemp("prepared"), lambda _: None)
+
+
+@pytest.fixture(scope="session")
+def laid(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same with gyro 0417, a year of its results and a study: for modules whose `prepared` this is."""
+    return _made(tmp_path_factory.mktemp("laid"), drift_laboratory.studied_laboratory)
+
+
+def _made(folder: Path, furnish: Callable[[Lab], object]) -> Path:
+    settings = Settings(data=folder)
     database = Database(settings.url)
     upgrade(database)
-    with Lab(settings, database, RecordFiles(settings.records), Notebook()).write(access.SYSTEM) as work:
+    lab = Lab(settings, database, RecordFiles(settings.records), Notebook())
+    with lab.write(access.SYSTEM) as work:
         access.add_account(work, "irina", "technician", PASSWORD, "I. Petrova")
         access.add_account(work, "dmitri", "designer", None, "D. Ivanov")
+        access.add_account(work, "natalia", "quality", None, "N. Orlova")
+    furnish(lab)
     database.close()
     return settings.data / "driftbook.sqlite"
 
@@ -123,6 +137,12 @@ def technician(application: FastAPI, lab: Lab) -> TestClient:
 def designer(application: FastAPI, lab: Lab) -> TestClient:
     """May only read."""
     return _signed_in(application, lab, "dmitri")
+
+
+@pytest.fixture
+def quality(application: FastAPI, lab: Lab) -> TestClient:
+    """May judge as well: freeze baselines, answer for alarms."""
+    return _signed_in(application, lab, "natalia")
 
 
 @pytest.fixture

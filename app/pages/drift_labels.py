@@ -1,0 +1,196 @@
+"""Names of findings, causes, events, baselines and models in words."""
+
+from collections.abc import Sequence
+from datetime import date
+from typing import Final
+
+from markupsafe import Markup, escape
+
+from app import figures
+from app.i18n import gettext, marked
+from app.pages import labels
+from app.pages.labels import Mark
+from app.services.drift.due import Due
+from app.services.drift.views import EventView
+
+ALARM_KINDS: Final = {
+    "out-of-limits": Mark("out", marked("Out of limits")),
+    "beyond-limits": Mark("out", marked("Beyond control")),
+    "step": Mark("out", marked("Step")),
+    "ewma": Mark("out", marked("Shifted (EWMA)")),
+    "cusum": Mark("out", marked("Shifted (CUSUM)")),
+    "trend": Mark("attention", marked("Drifting")),
+    "limit-ahead": Mark("attention", marked("Limit ahead")),
+    "repeatability": Mark("attention", marked("Scatters too much")),
+    "stand-azimuth": Mark("out", marked("Stand turned in azimuth")),
+    "stand-level-north": Mark("out", marked("Stand tilted about north")),
+    "stand-level-east": Mark("out", marked("Stand tilted about east")),
+    "stand-certificate": Mark("out", marked("Stand’s certificate doubtful")),
+}
+"""Kinds of alarm with the shape of their mark; a run rule is none of them and reads `_RUN`."""
+
+_SHORT: Final = 10
+_RUN: Final = Mark("attention", marked("Not by chance"))
+_SHAPES: Final = {"serious": "out", "warning": "attention", "notice": "due"}
+BEYOND: Final = frozenset({"beyond-limits", "nelson-1", "western-electric-1"})
+"""Signals of a value that lies beyond its own control limits."""
+
+RULES: Final = {
+    "nelson-1": marked("one value beyond the control limits"),
+    "nelson-2": marked("nine in a row on one side of the centre"),
+    "nelson-3": marked("six in a row, each higher or each lower than the last"),
+    "nelson-4": marked("fourteen in a row, up and down in turn"),
+    "nelson-5": marked("two of three beyond two standard deviations on one side"),
+    "nelson-6": marked("four of five beyond one standard deviation on one side"),
+    "nelson-7": marked("fifteen in a row within one standard deviation"),
+    "nelson-8": marked("eight in a row beyond one standard deviation on either side"),
+    "western-electric-1": marked("one value beyond the control limits"),
+    "western-electric-2": marked("two of three beyond two standard deviations on one side"),
+    "western-electric-3": marked("four of five beyond one standard deviation on one side"),
+    "western-electric-4": marked("eight in a row on one side of the centre"),
+}
+"""Run rules in words; pass through `rule`."""
+
+CAUSES: Final = {
+    "gyro": marked("The gyro itself"), "stand": marked("The stand"), "certificate": marked("The stand’s certificate"),
+    "operator": marked("How it was measured"), "environment": marked("Temperature, vibration, power"),
+    "repair": marked("A repair or an adjustment"),
+    "false-alarm": marked("False alarm"), "other": marked("Something else"),
+}  # fmt: skip
+"""What a person may name as the cause of an alarm; pass through `cause`."""
+
+EVENT_KINDS: Final = {
+    "repair": marked("Repair"), "adjustment": marked("Adjustment"), "moved": marked("Moved"),
+    "method": marked("Change of method"), "other": marked("Other"), "certificate": marked("New certificate"),
+    "solver": marked("New solver version"), "stand": marked("Another stand"),
+}  # fmt: skip
+
+_SOURCES: Final = {
+    "within-position": marked("Within a position"), "between-positions": marked("Between positions"),
+    "between-sessions": marked("Between sessions"), "between-starts": marked("Between starts"),
+    "between-days": marked("Between days"),
+}  # fmt: skip
+
+_STATUSES: Final = {
+    "in-control": Mark("ok", marked("in control")),
+    "beyond-control": Mark("out", marked("beyond control")),
+    "no-baseline": Mark("todo", marked("no baseline")),
+}
+
+_ESTIMATORS: Final = {
+    "moving-range": marked("mean moving range"), "standard-deviation": marked("standard deviation"),
+    "paule-mandel": marked("Paule–Mandel"),
+}  # fmt: skip
+_LIMITS: Final = {
+    "prediction": marked("prediction limits of stated probability"), "three-sigma": marked("three standard deviations"),
+}  # fmt: skip
+_MODELS: Final = {
+    "constant": marked("constant"), "linear": marked("linear"), "exponential": marked("exponential ageing"),
+}  # fmt: skip
+_GROUPS: Final = {
+    "session": marked("session"), "start": marked("start"), "day": marked("day"), "month": marked("month"),
+    "year": marked("year"),
+}  # fmt: skip
+_STATES: Final = {
+    "open": Mark("due", marked("Open")), "acknowledged": Mark("saved", marked("Acknowledged")),
+    "replaced": Mark("excluded", marked("Corrected")), "lapsed": Mark("ok", marked("Over")),
+}  # fmt: skip
+_METHODS: Final = {
+    "staircase": marked("Staircase"), "control-chart": marked("Control chart"), "in-use": marked("Time in use"),
+    "in-service": marked("Check in service"), "statistical": marked("Statistics of the type"),
+}  # fmt: skip
+
+
+def alarm(kind: str, severity: str = "") -> Mark:
+    """What was found, in a word or two."""
+    known = ALARM_KINDS.get(kind, _RUN)
+    return Mark(_SHAPES.get(severity, known.shape), gettext(known.word))
+
+
+def alarm_state(state: str) -> Mark:
+    """Whether somebody has acknowledged it."""
+    mark = _STATES[state]
+    return Mark(mark.shape, gettext(mark.word))
+
+
+def is_beyond(signals: tuple[str, ...]) -> bool:
+    """Whether a value lies beyond its own control limits."""
+    return bool(BEYOND & set(signals))
+
+
+def rule(name: str) -> str:
+    """A run rule in words."""
+    return gettext(RULES.get(name, name))
+
+
+def cause(name: str) -> str:
+    """The cause that a person named."""
+    return gettext(CAUSES.get(name, name))
+
+
+def due(found: Due, today: date) -> Mark:
+    """When the gyro is due, with the state of that."""
+    said = gettext("calibration due %(day)s, %(term)s")
+    if found.due is None:
+        return labels.due(found.state)
+    values = {"day": figures.day(found.due), "term": figures.term(found.due, today)}
+    return Mark(labels.due(found.state).shape, said % values)
+
+
+def interval_method(name: str) -> str:
+    """A method of finding the interval between calibrations."""
+    return gettext(_METHODS.get(name, name))
+
+
+def event_label(event: EventView) -> str:
+    """An event where there is room for a few letters only."""
+    if event.kind in ("certificate", "stand"):
+        return event.note
+    if event.kind == "solver":
+        return gettext("solver %(version)s") % {"version": event.note}
+    word = gettext(EVENT_KINDS.get(event.kind, event.kind)).lower()
+    word = f"{event.stand} {word}" if event.stand else word
+    return f"{word} {event.note}" if event.note and len(event.note) <= _SHORT else word
+
+
+def event(kind: str) -> str:
+    """What happened."""
+    return gettext(EVENT_KINDS.get(kind, kind))
+
+
+def source(name: str) -> str:
+    """A source of scatter."""
+    return gettext(_SOURCES.get(name, name))
+
+
+def status(name: str) -> Mark:
+    """Whether a parameter is in control."""
+    mark = _STATUSES[name]
+    return Mark(mark.shape, gettext(mark.word))
+
+
+def estimator(name: str) -> str:
+    """How a baseline's scatter was estimated."""
+    return gettext(_ESTIMATORS.get(name, name))
+
+
+def control_limits(name: str) -> str:
+    """How a baseline's limits are meant."""
+    return gettext(_LIMITS.get(name, name))
+
+
+def model(name: str) -> str:
+    """A course in a word."""
+    return gettext(_MODELS.get(name, name))
+
+
+def group(name: str) -> str:
+    """What a history is grouped by."""
+    return gettext(_GROUPS.get(name, name))
+
+
+def names(parameters: Sequence[str]) -> Markup:
+    """Symbols of several parameters; all eight in words."""
+    if len(parameters) == len(labels.PARAMETER_NAMES):
+        return escape(gettext("All parameters"))
+    return Markup(", ").join(labels.symbol(name) for name in parameters)

@@ -1,0 +1,197 @@
+"""Rows of a gyro's drift: results by session, trends, repeatability, what the limits stand on."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from app import figures
+from app.figures import Figure
+from app.i18n import gettext, ngettext
+from app.pages import drift_labels, drift_words
+from app.pages.drift_panels import ORDER
+from app.pages.labels import Mark
+from app.services.drift.views import BaselineView, DriftPoint, GyroDrift, ParameterDrift
+
+SOURCES: Final = (
+    "within-position",
+    "between-positions",
+    "between-sessions",
+    "between-starts",
+    "between-days",
+)
+Entry = Mapping[str, Any]
+
+
+def by_session(
+    parameters: Sequence[ParameterDrift], most: int
+) -> list[tuple[DriftPoint, dict[str, DriftPoint]]]:
+    """Of each result every parameter's point, the newest first, at most so many."""
+    found: dict[int, dict[str, DriftPoint]] = {}
+    for item in parameters:
+        for point in item.points:
+            found.setdefault(point.calibration, {})[item.parameter] = point
+    rows = [(next(iter(values.values())), values) for values in found.values()]
+    return sorted(rows, key=lambda row: row[0].at, reverse=True)[:most]
+
+
+@dataclass(frozen=True, slots=True)
+class Trend:
+    """Course, last step and forecast of a parameter, in words; `leaves`: it is to leave its limits."""
+
+    parameter: str
+    course: str
+    step: str
+    day: str
+    calibration: int | None
+    explained: bool
+    forecast: str
+    leaves: bool
+
+
+def trends(found: GyroDrift) -> list[Trend]:
+    """One row for each parameter that was studied."""
+    return [_trend(item, item.study) for item in found.parameters if item.study and item.study.get("trend")]
+
+
+def _trend(item: ParameterDrift, study: Entry) -> Trend:
+    steps = [change for change in study.get("changes", ()) if change["kind"] == "step"]
+    last = steps[-1] if steps else None
+    ahead = study.get("forecast")
+    return Trend(
+        parameter=item.parameter,
+        course=drift_words.course(study["trend"], item.unit),
+        step=drift_words.change(last, item.unit) if last else "",
+        day=drift_words.day(last["at"]) if last else "",
+        calibration=last["calibration"] if last else None,
+        explained=bool(last and (last.get("event") or last.get("event_kind"))),
+        forecast=drift_words.forecast(ahead, item.unit, limited=not item.low is item.high is None),
+        leaves=bool(ahead and ahead.get("leaves")),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """Scatter of one source: standard deviation, its interval, p of the F-test."""
+
+    source: str
+    sd: Figure
+    interval: str
+    p: str
+
+
+@dataclass(frozen=True, slots=True)
+class Scatter:
+    """Scatter of one parameter by source; `places` are the decimals of the row."""
+
+    parameter: str
+    unit: str
+    cells: tuple[Share | None, ...]
+    together: Figure
+    limit: str
+    limited: bool
+    verdict: Mark
+    places: int
+
+
+@dataclass(frozen=True, slots=True)
+class Repeatability:
+    """The table of all parameters, and what of it cannot be told apart."""
+
+    sources: tuple[str, ...]
+    rows: tuple[Scatter, ...]
+    confounded: str
+
+
+def repeatability(found: GyroDrift) -> Repeatability:
+    """Scatter by source, as far as the sessions tell it."""
+    studied = [item for item in found.parameters if item.study and item.study.get("components")]
+    known = {part["source"] for item in studied for part in (item.study or {})["components"]}
+    sources = tuple(source for source in SOURCES if source in known)
+    rows = tuple(_scatter(item, item.study or {}, sources) for item in studied)
+    return Repeatability(sources, rows, _confounded(studied))
+
+
+def _scatter(item: ParameterDrift, study: Entry, sources: Sequence[str]) -> Scatter:
+    parts = {part["source"]: part for part in study["components"]}
+    together = (study.get("together") or {}).get("sd")
+    places = figures.decimals_of(together) or 4
+    limit = study.get("repeatability_limit")
+    return Scatter(
+        item.parameter, item.unit, tuple(_share(parts.get(source), places) for source in sources),
+        figures.figure(together, places), figures.DASH if limit is None else figures.plain(limit),
+        limit is not None, _judged(study.get("repeatability_verdict")), places,
+    )  # fmt: skip
+
+
+def _share(part: Entry | None, places: int) -> Share | None:
+    if part is None or part.get("sd") is None:
+        return None
+    low, high = part.get("low"), part.get("high")
+    interval = (
+        "" if low is None or high is None else f"{figures.figure(low, places)}–{figures.figure(high, places)}"
+    )
+    p = part.get("p_value")
+    said = "" if p is None else drift_words.probability(p)
+    return Share(
+        part["source"], figures.figure(part["sd"], places), interval,
+        said if said.startswith("<") or not said else f"= {said}",
+    )  # fmt: skip
+
+
+_VERDICTS: Final = {
+    "conforms": "ok",
+    "within": "ok",
+    "fails": "out",
+    "beyond": "out",
+    "conditional": "attention",
+}
+
+
+def _judged(verdict: str | None) -> Mark:
+    shape = _VERDICTS.get(verdict or "", "todo")
+    words = {"ok": gettext("Within"), "out": gettext("Beyond"), "attention": gettext("Conditional"),
+             "todo": gettext("No limit")}  # fmt: skip
+    return Mark(shape, words[shape])
+
+
+def _confounded(studied: Sequence[ParameterDrift]) -> str:
+    """Sources that these sessions cannot tell apart, named once for all parameters."""
+    groups: dict[tuple[str, ...], None] = {}
+    for item in studied:
+        for part in (item.study or {})["components"]:
+            if part.get("confounded_with"):
+                groups[tuple(sorted((part["source"], *part["confounded_with"]), key=SOURCES.index))] = None
+    said = (" + ".join(drift_labels.source(name).lower() for name in group) for group in groups)
+    text = "; ".join(said)
+    return gettext("These sessions cannot tell apart: %(sources)s.") % {"sources": text} if text else ""
+
+
+@dataclass(frozen=True, slots=True)
+class Basis:
+    """What the limits of some parameters stand on."""
+
+    parameters: list[str]
+    text: str
+
+
+def bases(found: GyroDrift) -> list[Basis]:
+    """One sentence for all parameters whose baselines were frozen together."""
+    groups: dict[str, list[str]] = {}
+    for line in found.baselines:
+        names = groups.setdefault(_basis(line), [])
+        if line.parameter not in names:
+            names.append(line.parameter)
+    return [Basis(sorted(names, key=ORDER.index), text) for text, names in groups.items()]
+
+
+def _basis(line: BaselineView) -> str:
+    count = len(line.calibrations)
+    values = {
+        "sessions": ngettext("%(num)d session", "%(num)d sessions", count) % {"num": count},
+        "since": figures.day(line.valid_from), "estimator": drift_labels.estimator(line.estimator),
+        "limits": drift_labels.control_limits(line.limits), "day": figures.day(line.frozen_at),
+        "name": line.frozen_by,
+    }  # fmt: skip
+    text = gettext("individuals chart from %(since)s, %(sessions)s, %(estimator)s, %(limits)s, frozen on "
+                   "%(day)s by %(name)s.") % values  # fmt: skip
+    return f"{text} {line.reason}".strip()

@@ -1,0 +1,142 @@
+"""What a study found, in sentences: courses, forecasts, alarms, numbers down to the digits that they bear."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import date, datetime
+from typing import Any, Final
+
+from app import figures
+from app.i18n import gettext, translate
+from app.pages import drift_labels, labels
+from app.services.drift.views import AlarmView
+from app.services.views import COVERAGE_FACTOR
+
+_WEEKS_FROM: Final = 21
+_DAYS_A_MONTH: Final = 365.25 / 12
+Entry = Mapping[str, Any]
+"""A part of a study's document."""
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """A translatable sentence with its values (see `i18n.Sentence`)."""
+
+    template: str
+    values: Mapping[str, Any]
+
+
+def sentence(template: str, values: Mapping[str, Any]) -> str:
+    """A finding's or a method's sentence; units and days among its values as people read them."""
+    return translate(Said(template, {name: _readable(name, value) for name, value in values.items()}))
+
+
+def _readable(name: str, value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    if name == "unit":
+        return labels.unit(value)
+    if name in labels.PARAMETER_UNITS.values():
+        return labels.unit(value)
+    if name == "rule":
+        return drift_labels.rule(value)
+    if name == "parameter" and value in labels.PARAMETER_NAMES:
+        return labels.symbol_text(value)
+    moment = _moment(value)
+    return figures.day(moment) if moment else value
+
+
+def _moment(text: str) -> date | None:
+    """The day that an ISO text names, if it names one."""
+    if len(text) < len("2026-01-01") or text[4:5] != "-":
+        return None
+    try:
+        return date.fromisoformat(text[:10])
+    except ValueError:
+        return None
+
+
+def moment(text: str | None) -> datetime | None:
+    """A time of a document."""
+    return datetime.fromisoformat(text) if text else None
+
+
+def day(text: str | None) -> str:
+    """A document's time as a day."""
+    found = moment(text)
+    return figures.day(found) if found else figures.DASH
+
+
+def alarm(found: AlarmView) -> str:
+    """An alarm's sentence."""
+    said = sentence(found.template, found.values)
+    return (
+        f"{drift_labels.rule(found.kind).capitalize()}. {said}" if found.kind in drift_labels.RULES else said
+    )
+
+
+def course(trend: Entry, unit: str) -> str:
+    """How a parameter goes on since its last change: constant, so much a year, or ageing."""
+    since = day(trend.get("since"))
+    slope, u_slope = trend.get("slope_per_year"), trend.get("u_slope_per_year")
+    if trend["model"] == "constant" or slope is None:
+        return gettext("constant since %(day)s") % {"day": since}
+    text, expanded = _signed(slope, u_slope)
+    values = {"slope": text, "u": expanded, "unit": labels.unit(unit), "day": since}
+    if trend["model"] == "exponential" and trend.get("time_constant_days"):
+        values["days"] = figures.significant(trend["time_constant_days"], 2)
+        return gettext("ageing since %(day)s with a time constant of %(days)s days; now %(slope)s ± %(u)s "
+                       "%(unit)s a year") % values  # fmt: skip
+    return gettext("%(slope)s ± %(u)s %(unit)s a year since %(day)s") % values
+
+
+def _signed(value: float, u: float | None) -> tuple[str, str]:
+    expanded = None if u is None else COVERAGE_FACTOR * u
+    decimals = figures.decimals_of(expanded)
+    if decimals is None:
+        return figures.significant(value, 2), figures.DASH
+    return str(figures.figure(value, decimals, sign=True)), str(figures.figure(expanded, decimals))
+
+
+def a_month(per_year: float) -> float:
+    """A slope per year as one per month."""
+    return per_year * _DAYS_A_MONTH / 365.25
+
+
+def forecast(found: Entry | None, unit: str, *, limited: bool) -> str:
+    """Whether and when the parameter is to leave its limits."""
+    if not found or not found.get("at"):
+        return gettext("too few sessions to forecast")
+    if not limited:
+        return gettext("no limit to reach")
+    leaves = found.get("leaves")
+    if not leaves:
+        return gettext("within its limits until %(day)s at least") % {"day": day(found["at"][-1])}
+    values = {"limit": figures.plain(leaves["limit"]), "unit": labels.unit(unit), "day": day(leaves["date"]),
+              "earliest": day(leaves["earliest"]), "latest": day(leaves["latest"])}  # fmt: skip
+    if not leaves.get("date"):
+        return gettext("may reach %(limit)s %(unit)s from %(earliest)s on") % values
+    if not leaves.get("latest"):
+        return gettext("reaches %(limit)s %(unit)s on %(day)s (not before %(earliest)s)") % values
+    return gettext("reaches %(limit)s %(unit)s on %(day)s (between %(earliest)s and %(latest)s)") % values
+
+
+def change(found: Entry, unit: str) -> str:
+    """A step with its uncertainty: ``+0.0224 ± 0.0013 °/h``."""
+    text, expanded = _signed(found["size"], found.get("u"))
+    return f"{text} ± {expanded} {labels.unit(unit)}"
+
+
+def probability(value: float | None) -> str:
+    """A probability of a test: ``0.032``, ``< 0.001``."""
+    if value is None:
+        return figures.DASH
+    if value < 0.001:
+        return f"< {figures.plain(0.001)}"
+    return str(figures.figure(value, 3 if value < 0.1 else 2))
+
+
+def percent(value: float | None, digits: int = 2) -> str:
+    """A probability in percent: ``0.27 %``."""
+    if value is None:
+        return figures.DASH
+    return f"{figures.significant(100.0 * value, digits)}\u202f%"
