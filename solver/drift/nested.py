@@ -56,6 +56,8 @@ from solver.drift.strata import Groups, Strata, nested_groups, strata
 from solver.errors import InputError, Message
 from solver.records import Array
 
+__all__ = ["Component", "Repeatability", "Within", "nested_components"]
+
 
 def nested_components(
     values: ArrayLike,
