@@ -70,6 +70,8 @@ def _root(y: Array, known: Array, columns: Array, dof: int) -> float:
     variance = float(plain @ plain) / dof
     if variance <= (_EPS * len(y) * float(np.abs(y).max())) ** 2:
         return 0.0
+    if known.min() == known.max():
+        return max(variance - float(known[0]), 0.0)
     # Where an u is 0, weights and Q may be infinite at τ² = 0: there the first step begins beside it.
     nothing = _NEGLIGIBLE * variance
     tau2 = 0.0 if known.min() > nothing else nothing
