@@ -14,6 +14,8 @@ from app.pages.forms import Fields, Form, Sent
 from app.pages.sparkline import Sparkline, sparkline
 from app.pages.tables import Row, csv_answer, json_answer
 from app.services import gyros, history
+from app.services.drift import due
+from app.services.drift.due import Due
 from app.services.lab import Work
 from app.services.views import GyroView
 from solver.records import PARAMETERS
@@ -68,9 +70,11 @@ def listing(
         start = max(0, start)
         shown = found[start : start + _PER_PAGE]
         drifts = {gyro.serial: _year(work, gyro.serial) for gyro in shown if gyro.last_result}
+        due_on = due.due_of(work, [gyro.serial for gyro in shown])
         kinds = gyros.types(work)
     return render(
         request, "gyros/list.html", gyros=shown, total=len(found), start=start, drifts=drifts, kinds=kinds,
+        due_on=due_on, today=datetime.now(UTC).date(),
         everything=len(everything), sort=sort if sort.removeprefix("-") in _SORTS else "-status", wanted=wanted,
         type_counts=_counts(_chosen(everything, replace(wanted, kind="")), lambda gyro: gyro.type),
         status_counts=_counts(
@@ -86,7 +90,9 @@ def exported(
 ) -> Response:
     """The same list as a file."""
     with lab.read(person) as work:
-        rows = [_row(gyro) for gyro in _ordered(_chosen(tuple(_all(work)), wanted), sort)]
+        found = _ordered(_chosen(tuple(_all(work)), wanted), sort)
+        due_on = {item.gyro: item for item in due.due_list(work)}
+        rows = [_row(gyro, due_on[gyro.serial]) for gyro in found]
     return json_answer(rows) if form == "json" else csv_answer(rows, _COLUMNS, "gyros")
 
 
@@ -184,16 +190,16 @@ def _year(work: Work, serial: str) -> Sparkline | None:
 
 
 _COLUMNS: Final = (
-    "serial", "type", "status", "note", "last_session", "last_measured_at", "last_stand",
+    "serial", "type", "status", "note", "last_session", "last_measured_at", "last_stand", "due", "due_state",
     *(f"{labels.field(name)}{end}" for name in PARAMETERS for end in ("", "_u")),
 )  # fmt: skip
 
 
-def _row(gyro: GyroView) -> Row:
+def _row(gyro: GyroView, holds: Due) -> Row:
     row: Row = {
         "serial": gyro.serial, "type": gyro.type, "status": labels.result_status(gyro.last_result),
         "note": gyro.note, "last_session": gyro.last_session, "last_measured_at": gyro.last_measured_at,
-        "last_stand": gyro.last_stand,
+        "last_stand": gyro.last_stand, "due": holds.due, "due_state": holds.state,
     }  # fmt: skip
     for name in PARAMETERS:
         view = gyro.last_result.parameters.get(name) if gyro.last_result else None

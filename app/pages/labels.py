@@ -211,5 +211,17 @@ def problem_texts(job: JobView) -> Sequence[str]:
     return [translate(item) for item in job.problems]
 
 
+_DUE: Final = {
+    "overdue": Mark("overdue", marked("Overdue")), "never": Mark("todo", marked("Never calibrated")),
+    "due-soon": Mark("due", marked("Due soon")), "valid": Mark("ok", marked("In time")),
+    "no-interval": Mark("todo", marked("No interval set")),
+}  # fmt: skip
+
+
+def due(state: str) -> Mark:
+    """Whether a gyro has to be calibrated again."""
+    return _said(_DUE[state])
+
+
 def _said(mark: Mark) -> Mark:
     return Mark(mark.shape, gettext(mark.word))

@@ -11,7 +11,10 @@ and a change of theme needs no redrawing. `theme.printed` puts the light or dark
 from app.plots.allan import AllanPoint, MeanPoint, allan
 from app.plots.autocorrelation import autocorrelation
 from app.plots.bode import MarginMark, bode
+from app.plots.common_mode import CommonPoint, common_mode
 from app.plots.convergence import Change, convergence
+from app.plots.correlation_map import CorrelationMark, correlation_map
+from app.plots.distribution import DistributionPoint, distribution
 from app.plots.drift import drift
 from app.plots.drift_marks import ControlStretch, DriftChange, DriftEvent, DriftLimit, DriftPoint, Forecast
 from app.plots.live import LivePoint, live
@@ -28,7 +31,10 @@ __all__ = [
     "LIMIT_SD",
     "AllanPoint",
     "Change",
+    "CommonPoint",
     "ControlStretch",
+    "CorrelationMark",
+    "DistributionPoint",
     "DriftChange",
     "DriftEvent",
     "DriftLimit",
@@ -45,8 +51,11 @@ __all__ = [
     "allan",
     "autocorrelation",
     "bode",
+    "common_mode",
     "convergence",
+    "correlation_map",
     "decade",
+    "distribution",
     "drift",
     "live",
     "live_news",

@@ -7,7 +7,9 @@ from app.plots import dates
 from app.plots.allan import template as allan_template
 from app.plots.autocorrelation import template as autocorrelation_template
 from app.plots.bode import template as bode_template
+from app.plots.common_mode import template as common_mode_template
 from app.plots.convergence import template as convergence_template
+from app.plots.distribution import template as distribution_template
 from app.plots.drift import template as drift_template
 from app.plots.live import template as live_template
 from app.plots.pareto import template as pareto_template
@@ -43,9 +45,11 @@ def make_templates() -> None:
     bode_template()
     poles_template()
     step_response_template()
+    distribution_template()
     drift_template(False, 1)
     for step in dates.STEPS:
         drift_template(True, step)
+        common_mode_template(True, step)
     for channel in ("x", "y"):
         record_template(channel)
         live_template(channel)
