@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,6 +11,9 @@ from solver.drift.in_use import Use
 from solver.drift.reliability import TARGET
 from solver.errors import InputError, Message
 from solver.records import Array
+
+COUNTS_FROM: Final = 0.75
+"""Share of the interval from which a finding counts as one at its end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +30,54 @@ class Findings:
 
     days: ArrayLike
     used: ArrayLike
+
+    @classmethod
+    def of_history(
+        cls, days: ArrayLike, used: ArrayLike, interval: float, breaks: Sequence[float] = ()
+    ) -> "Findings":
+        """Take the findings out of a history in which calibrations may be more frequent than the interval.
+
+        An interval begins at a calibration within the limits and ends at the first one that is beyond
+        them, or at which three quarters of the interval are over; those between are checks on the way. A
+        repair or an adjustment ends it without a finding.
+
+        Parameters
+        ----------
+        days, used : (n,) array_like
+            Time of each calibration and largest share of a limit used.
+        interval : float
+            Interval so far, days.
+        breaks : sequence of float
+            Times of repairs and adjustments, days; a calibration of that very time comes after it.
+        """
+        moments, shares = np.asarray(days, np.float64), np.asarray(used, np.float64)
+        if shares.shape != moments.shape or moments.ndim != 1:
+            raise InputError(_FINDINGS)
+        order = np.argsort(moments, kind="stable")
+        lengths, found = list[float](), list[float]()
+        begun: float | None = None
+        for moment, share in zip(moments[order].tolist(), shares[order].tolist(), strict=True):
+            if begun is not None and any(begun < event <= moment for event in breaks):
+                begun = None
+            if (
+                begun is not None
+                and moment > begun
+                and (share > 1.0 or moment - begun >= COUNTS_FROM * interval)
+            ):
+                lengths.append(moment - begun)
+                found.append(share)
+                begun = None
+            if begun is None and share <= 1.0:
+                begun = moment
+        return cls(np.array(lengths), np.array(found))
+
+    @classmethod
+    def together(cls, several: Sequence["Findings"]) -> "Findings":
+        """Findings of several gyros of a type."""
+        checked = [one.checked() for one in several]
+        if not checked:
+            return cls(np.empty(0), np.empty(0))
+        return cls(np.concatenate([one[0] for one in checked]), np.concatenate([one[1] for one in checked]))
 
     def checked(self) -> tuple[Array, Array]:
         """Both as arrays; InputError if they do not fit."""

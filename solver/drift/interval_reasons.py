@@ -226,7 +226,10 @@ def chosen(method: Method, days: int, wanted: float, now: float) -> Message:
     numbers = {"days": days, "wanted": round(wanted), "now": round(now)}
     if days == 0:
         return Message(
-            "interval-over", "Recalibrate now: the shortest of the intervals is over within a week.", numbers
+            "interval-over",
+            "No interval keeps the gyro within its limits: the shortest advice is over within a week. Recalibrate "
+            "now, and judge whether it is fit for use.",
+            numbers,
         )
     if wanted > 2.0 * now:
         return Message(

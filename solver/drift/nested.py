@@ -118,31 +118,35 @@ class _Rows:
 
 @dataclass(frozen=True, slots=True)
 class _Noise:
-    """Variances u² and, by the fits, the factor c with its degrees of freedom."""
+    """Variances u² and, by the fits, the factor c with its degrees of freedom.
+
+    `given` is False where nothing is known within the sessions, `fitted` where no fit says what c is.
+    """
 
     variances: Array
     factor: float
     dof: float
     u_dof: float
+    given: bool
     fitted: bool
 
     @classmethod
     def of(cls, within: Within | None, count: int) -> "_Noise":
         if within is None:
-            return cls(np.zeros(count), 1.0, np.inf, np.inf, False)
+            return cls(np.zeros(count), 1.0, np.inf, np.inf, False, False)
         u = np.asarray(within.u, np.float64)
         u_dof = np.inf if within.u_dof is None else within.u_dof
         if u.shape != (count,) or not np.isfinite(u).all() or (u < 0.0).any() or not u_dof > 0.0:
             raise InputError(_NOISE)
         if within.chi2 is None or within.dof is None:
-            return cls(u**2, 1.0, u_dof, u_dof, False)
+            return cls(u**2, 1.0, u_dof, u_dof, True, False)
         chi2, dof = np.asarray(within.chi2, np.float64), np.asarray(within.dof, np.float64)
         if chi2.shape != u.shape or dof.shape != u.shape or not (chi2 >= 0.0).all() or not (dof >= 0.0).all():
             raise InputError(_NOISE)
         total = float(dof.sum())
         if total == 0.0:
-            return cls(u**2, 1.0, u_dof, u_dof, False)
-        return cls(u**2, float(chi2.sum()) / total, total, u_dof, True)
+            return cls(u**2, 1.0, u_dof, u_dof, True, False)
+        return cls(u**2, float(chi2.sum()) / total, total, u_dof, True, True)
 
     @property
     def mean(self) -> float:
@@ -204,7 +208,7 @@ def _solve(table: Strata, rows: _Rows, noise: _Noise, level: float) -> Repeatabi
         test = _test(table, j, expected, squares, effective, estimates, spread)
         lines += [_merged(row, names, float(dof[j]), test)]
         lines += [_elsewhere(name, names) for name in names[1:]]
-    lowest = _known(noise, level) if noise.variances.any() else ()
+    lowest = _known(noise, level) if noise.given else ()
     whole = combinations[:count].sum(axis=0)
     whole[count] += noise.mean
     together = _component("together", whole, squares, effective, level)

@@ -29,7 +29,7 @@ from scipy import special
 
 from solver.drift import interval_reasons as reasons
 from solver.drift.in_use import Use, band_meets, follow_use
-from solver.drift.interval_evidence import Check, Evidence, Findings, Outlook
+from solver.drift.interval_evidence import COUNTS_FROM, Check, Evidence, Findings, Outlook
 from solver.drift.interval_reasons import Method
 from solver.drift.reliability import TARGET, judge_interval, reliability_model
 from solver.errors import InputError, Message
@@ -43,7 +43,6 @@ GRID: Final = (7, 14, 30, 61, 91, 122, 183, 274, 365, 548, 730, 1096, 1461, 1826
 COMFORTABLE: Final = 0.8
 """Share of the limits within which a finding speaks for a longer interval."""
 SIGNIFICANT: Final = 0.05
-_COUNTS_FROM: Final = 0.75
 _LARGEST_CHANGE: Final = 2.0
 _FEWEST_FINDINGS: Final = 5
 _ONE_LENGTH: Final = 1.5
@@ -121,7 +120,7 @@ def staircase(days: float, findings: Findings | None) -> MethodAdvice:
         failed = min(days, float(times[-1]))
         shorter = _step(failed, -1)
         return MethodAdvice("staircase", shorter, reasons.beyond(failed, shorter, float(used[-1])))
-    counting = used[(times >= _COUNTS_FROM * days) | (used > 1.0)]
+    counting = used[(times >= COUNTS_FROM * days) | (used > 1.0)]
     if len(counting) == 0:
         return MethodAdvice("staircase", None, reasons.no_findings(days, len(used)))
     last = counting[-2:]

@@ -5,9 +5,7 @@ import pytest
 from scipy import stats
 
 from solver.drift.components import Within
-from solver.drift.mean_squares import bounds, effective_dof
 from solver.drift.nested import nested_components
-from solver.drift.strata import nested_groups, strata
 from solver.errors import InputError
 from solver.variance_components import variance_components
 
@@ -141,67 +139,6 @@ def test_the_error_of_the_looms():
     assert error.high**2 == pytest.approx(22.75 / stats.chi2.ppf(0.025, 12), rel=1e-9)
 
 
-def test_sums_of_squares_by_dense_projections():
-    rng = np.random.default_rng(3)
-    day, start = ragged(rng, 7, 3, 4)
-    count = len(day)
-    design = np.column_stack([np.arange(count), np.arange(count) > count / 3]).astype(float)
-    noise, values = rng.uniform(0.1, 2.0, count), rng.normal(size=count)
-    found = strata(values, nested_groups([day, start], count), design, noise)
-    classes = [np.eye(labels.max() + 1)[labels] for labels in (day, start, np.arange(count))]
-    spans = [np.column_stack((np.ones(count), design, *classes[:j])) for j in range(4)]
-    projections = [span @ np.linalg.pinv(span) for span in spans]
-    for j in range(3):
-        form = projections[j + 1] - projections[j]
-        assert found.dof[j] == round(np.trace(form))
-        # rounding of pseudo-inverses of a few dozen rows
-        assert found.squares[j] == pytest.approx(values @ form @ values, rel=1e-9)
-        assert found.noise[j] == pytest.approx(np.diag(form) @ noise, rel=1e-9)
-        traces = [np.trace(form @ z @ z.T) for z in classes]
-        assert found.coefficients[j] == pytest.approx(traces, abs=1e-9 * count)
-
-
-def test_reach_by_dense_traces():
-    rng = np.random.default_rng(4)
-    day, start = ragged(rng, 6, 4, 5)
-    count = len(day)
-    noise, variances = rng.uniform(0.1, 2.0, count), np.array([2.0, 0.5, 0.3])
-    found = strata(rng.normal(size=count), nested_groups([day, start], count), np.empty((count, 0)), noise)
-    classes = [np.eye(labels.max() + 1)[labels] for labels in (day, start, np.arange(count))]
-    projections = [z @ np.linalg.pinv(z) for z in (np.ones((count, 1)), *classes)]
-    whole = sum(v * z @ z.T for v, z in zip(variances, classes, strict=True)) + np.diag(noise)
-    for j in range(3):
-        product = (projections[j + 1] - projections[j]) @ whole
-        expected = np.trace(product) ** 2 / np.trace(product @ product) / found.dof[j]
-        assert found.reach(j, variances, noise) == pytest.approx(expected, rel=1e-9)
-
-
-def test_bounds_are_exact_where_one_mean_square_is_left():
-    dof = np.array([5.0, 12.0])
-    low, high = bounds(np.array([0.25, -0.25]), np.array([4.0, 0.0]), dof, 0.95)
-    assert low == pytest.approx(5 / stats.chi2.ppf(0.975, 5), rel=1e-9)
-    assert high == pytest.approx(5 / stats.chi2.ppf(0.025, 5), rel=1e-9)
-    low, high = bounds(np.array([1.0, -1.0]), np.array([4.0, 1.0]), np.array([5.0, np.inf]), 0.95)
-    assert low == pytest.approx(4 * 5 / stats.chi2.ppf(0.975, 5) - 1, rel=1e-9)
-    assert high == pytest.approx(4 * 5 / stats.chi2.ppf(0.025, 5) - 1, rel=1e-9)
-
-
-def test_the_lower_bound_is_zero_just_where_f_is_not_significant():
-    """Ting et al., 1990: with two mean squares the bound and the F test at half the complement agree."""
-    critical = stats.f.ppf(0.975, 3, 8)
-    for ratio, sign in ((critical * 1.001, 1), (critical * 0.999, -1)):
-        low, _ = bounds(np.array([1.0, -1.0]), np.array([ratio, 1.0]), np.array([3.0, 8.0]), 0.95)
-        assert np.sign(low) == sign
-
-
-def test_effective_degrees_of_freedom():
-    """JCGM 100:2008, G.4.1, eq. (G.2b): one component alone keeps its own; two equal ones of n have 2·n together."""
-    assert effective_dof(np.array([1.0, 0.0]), np.array([3.0, 5.0]), np.array([7.0, 2.0])) == pytest.approx(
-        7.0
-    )
-    assert effective_dof(np.array([0.5, 0.5]), np.ones(2), np.array([6.0, 6.0])) == pytest.approx(12.0)
-
-
 CASES = {
     "balanced": (np.repeat(range(8), 4), np.repeat(range(16), 2), (1.0, 0.7, 0.5), False),
     "ragged": (*ragged(np.random.default_rng(5), 8, 4, 4), (1.0, 0.7, 0.5), True),
@@ -278,6 +215,23 @@ def test_without_a_fit_positions_are_confounded_with_the_noise():
     found = nested_components([1.0, 2.0, 4.0], {}, Within([0.1, 0.1, 0.1]))
     assert found["within-position"].confounded_with == ("between-positions",)
     assert found["between-positions"].variance is None
+
+
+def test_values_without_any_scatter():
+    found = nested_components([2.0, 2.0, 2.0], {}, Within([0.0, 0.0, 0.0]))
+    assert [row.sd for row in found.components] == [0.0, None, 0.0]
+    assert (found["between-sessions"].f, found.together.high) == (None, 0.0)
+
+
+def test_ten_thousand_sessions_are_a_matter_of_a_moment():
+    """No array of sessions by sessions: such would take 800 MB."""
+    count = 10_000
+    rng = np.random.default_rng(11)
+    labels = {"between-days": np.arange(count) // 6, "between-starts": np.arange(count) // 2}
+    design = rng.normal(size=(count, 4))
+    values = rng.normal(0, 0.3, count) + rng.normal(0, 2, count // 2)[labels["between-starts"]]
+    found = nested_components(values, labels, Within(np.full(count, 0.1)), design=design)
+    assert found["between-starts"].low < 2.0 < found["between-starts"].high
 
 
 def test_one_session_of_each_start():

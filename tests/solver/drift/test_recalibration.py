@@ -45,6 +45,41 @@ def test_early_findings_do_not_make_the_interval_longer_nor_hide_those_that_coun
     assert found.days == 548
 
 
+def test_findings_of_a_history_with_more_calibrations_than_intervals():
+    """Monthly, the interval a year: every tenth month ends one, a value beyond the limit ends its own."""
+    days = np.arange(0, 1501, 30)
+    used = np.full(51, 0.5)
+    found = Findings.of_history(days, used, 365)
+    assert found.days.tolist() == [300] * 5
+    used[[20, 21]] = (
+        1.2  # at 600 days, ending the second interval, and still at 630: no interval begins there
+    )
+    found = Findings.of_history(days[::-1], used[::-1], 365)  # the order does not matter
+    assert found.days.tolist() == [300, 300, 300, 300]
+    assert found.used.tolist() == [0.5, 1.2, 0.5, 0.5]
+    used[[20, 21]], used[23] = 0.5, 1.2
+    assert Findings.of_history(days, used, 365).days.tolist() == [300, 300, 90, 300, 300]
+
+
+def test_a_repair_ends_an_interval_without_a_finding():
+    found = Findings.of_history(np.arange(0, 1201, 100), np.full(13, 0.5), 400, breaks=[550.0, 900.0])
+    # begun at 0, 300, after the repair at 600, and at 900, which comes after the repair of that very time
+    assert found.days.tolist() == [300, 300]
+
+
+def test_findings_of_several_gyros():
+    both = Findings.together([Findings([365], [0.2]), Findings([90, 91], [0.3, 2.0])])
+    assert (both.days.tolist(), both.used.tolist()) == ([365, 90, 91], [0.2, 0.3, 2.0])
+    assert len(Findings.together([]).days) == 0
+
+
+def test_frequent_calibrations_do_not_shorten_the_interval():
+    """Five years of monthly calibrations well within limits: nothing speaks against the year there is."""
+    history = Findings.of_history(np.arange(0, 1830, 30), np.full(61, 0.5), 365)
+    found = recommend(Evidence(365, own=history, of_type=Findings.together([history] * 10)))
+    assert found.days == 548
+
+
 def test_the_stairs_end():
     assert staircase(1826, Findings([1826, 1826], [0.1, 0.1])).days == 1826
     assert staircase(7, Findings([7], [2.0])).days == 7
@@ -220,6 +255,8 @@ def test_what_does_not_fit_is_refused():
         staircase(365, Findings([365, 0], [0.1, 0.1]))
     with pytest.raises(InputError, match="length in days"):
         staircase(365, Findings([365], [0.1, 0.1]))
+    with pytest.raises(InputError, match="length in days"):
+        Findings.of_history([365], [0.1, 0.1], 365)
     with pytest.raises(InputError, match="as many ends"):
         control_chart([Outlook("w0x", [0.0], [0.0, 1.0], [0.0], None, 1.0)], 100)
     with pytest.raises(InputError, match="not negative"):
