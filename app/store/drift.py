@@ -284,6 +284,14 @@ def alarm_counts(db: Session) -> Mapping[str, int]:
     return {row[0]: row[1] for row in rows}
 
 
+def sessions_of(db: Session, calibration_ids: Collection[int]) -> dict[int, int]:
+    """The session of each of these results."""
+    rows = db.execute(
+        sa.select(Calibration.id, Calibration.session_id).where(Calibration.id.in_(calibration_ids))
+    )
+    return {row[0]: row[1] for row in rows}
+
+
 def measured_at(db: Session, calibration_ids: Collection[int]) -> dict[int, datetime]:
     """When the sessions of these results were."""
     rows = db.execute(

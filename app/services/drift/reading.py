@@ -8,14 +8,22 @@ from typing import Any, Final
 import numpy as np
 
 from app.errors import Invalid, problem
+from app.exchange.json_values import Json
 from app.exchange.si import PARAMETER_UNITS
 from app.services.drift import alarms, baselines, events, grouping, series
 from app.services.drift.series import SeriesTable, aware
-from app.services.drift.views import DriftPoint, GyroDrift, ParameterDrift
+from app.services.drift.views import (
+    DriftPoint,
+    EventView,
+    GyroDrift,
+    ParameterDrift,
+    ReplacedValue,
+)
 from app.services.finding import find_gyro
 from app.services.job_views import job_view
 from app.services.lab import Work
 from app.services.verdicts import judge
+from app.services.views import COVERAGE_FACTOR
 from app.store import drift, results
 from app.store.tables import DriftStudy, Gyro
 from solver.records import PARAMETERS
@@ -82,6 +90,56 @@ def gyro_drift(
         events=tuple(sorted(found, key=lambda item: item.at)),
         baselines=baselines.of_gyro(work, serial, method=method),
         alarms=alarms.alarms(work, gyro=serial, method=method),
+    )  # fmt: skip
+
+
+def all_events(work: Work, serial: str, *, withdrawn: bool = False) -> tuple[EventView, ...]:
+    """What people entered for a gyro and its stands, and what its sessions by every method tell."""
+    gyro = find_gyro(work, serial)
+    entered = events.of_gyro(work, serial, withdrawn=withdrawn)
+    told: dict[tuple[str, int | None], EventView] = {}
+    for row in drift.studies(work.db, gyro.id, None, whole=True):
+        if row.series is not None:
+            told |= {
+                (item.kind, item.session): item for item in events.derived(series.decode(row.series), serial)
+            }
+    return tuple(sorted([*entered, *told.values()], key=lambda item: item.at))
+
+
+def components(work: Work, serial: str, *, method: str = "least-squares") -> tuple[Json, ...]:
+    """How much each parameter of a gyro scatters, by source: rows of the study's document with parameter and unit."""
+    _check(method, (), "session")
+    row = drift.study(work.db, find_gyro(work, serial).id, None, method)
+    document = (
+        json.loads(row.document) if row is not None and row.document is not None else {"parameters": {}}
+    )
+    return tuple(
+        {"parameter": name, "unit": entry["unit"], **line}
+        for name, entry in document["parameters"].items()
+        for line in (*entry["components"], *([entry["together"]] if entry["together"] else []))
+    )
+
+
+def replaced(work: Work, serial: str, *, method: str = "least-squares") -> tuple[ReplacedValue, ...]:
+    """Results of a gyro by a method that count no more, with the one that counts in their place, if any."""
+    _check(method, (), "session")
+    gyro = find_gyro(work, serial)
+    rows = drift.result_rows(work.db, gyro.id)
+    values = [item for item in drift.value_rows(work.db, gyro.id) if item.method == method]
+    solved = {item.calibration for item in values}
+    counting = {row.session: row.calibration for row in series.counting(rows, dict.fromkeys(solved))}
+    gone = {
+        row.calibration: row
+        for row in rows
+        if row.calibration in solved and counting.get(row.session) != row.calibration
+    }
+    return tuple(
+        ReplacedValue(
+            row.session, row.measured_at, row.calibration, row.revision, counting.get(row.session),
+            item.parameter, item.value, item.u, item.k or COVERAGE_FACTOR,
+        )
+        for item in values
+        if (row := gone.get(item.calibration)) is not None
     )  # fmt: skip
 
 

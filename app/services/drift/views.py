@@ -51,7 +51,11 @@ class EventView:
 
 @dataclass(frozen=True, slots=True)
 class BaselineView:
-    """What a parameter is judged against, with everything that was chosen for it."""
+    """What a parameter is judged against, with everything that was chosen for it.
+
+    `sessions` are those of `calibrations`, the results that it was computed from: a result that is corrected
+    later stays the baseline's.
+    """
 
     id: int
     gyro: str
@@ -60,6 +64,7 @@ class BaselineView:
     method: str
     valid_from: datetime
     calibrations: tuple[int, ...]
+    sessions: tuple[int, ...]
     estimator: str
     centre: float
     scatter: float
@@ -228,13 +233,16 @@ class GyroDrift:
 
 @dataclass(frozen=True, slots=True)
 class ReplacedValue:
-    """A result that counts no more: a later revision from other input, or by the same method, replaced it."""
+    """A result that counts no more: a later revision from other input, or by the same method, replaced it.
+
+    `replaced_by` is the one that counts in its place; None when the session has none by the method.
+    """
 
     session: int
     measured_at: datetime
     calibration: int
     revision: int
-    replaced_by: int
+    replaced_by: int | None
     parameter: str
     value: float | None
     u: float | None
