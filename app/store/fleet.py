@@ -1,13 +1,22 @@
 """Queries for the fleet: each gyro's last sound calibration, a type's gyros, who was measured on a stand."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import NamedTuple
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from app.store.tables import Calibration, CalibrationParameter, Gyro, GyroType, MeasuringSession, Stand
+from app.store.tables import (
+    Alarm,
+    Calibration,
+    CalibrationParameter,
+    DriftStudy,
+    Gyro,
+    GyroType,
+    MeasuringSession,
+    Stand,
+)
 from solver.records import PARAMETERS
 
 
@@ -77,3 +86,37 @@ def _determined(session: type[MeasuringSession]) -> sa.ScalarSelect[int]:
         .correlate(session)
         .scalar_subquery()
     )
+
+
+class Studied(NamedTuple):
+    """A gyro's study by one method; `document` is its JSON text, None before the first one."""
+
+    gyro_id: int
+    document: str | None
+    up_to_date: bool
+
+
+def studies_of(db: Session, gyro_ids: Sequence[int], method: str) -> Sequence[Studied]:
+    """What is known of the drift of these gyros."""
+    rows = db.execute(
+        sa.select(DriftStudy.gyro_id, DriftStudy.document, DriftStudy.studied >= DriftStudy.changed).where(
+            DriftStudy.gyro_id.in_(gyro_ids), DriftStudy.method == method
+        )
+    )
+    return [Studied(gyro_id, document, bool(fresh)) for gyro_id, document, fresh in rows]
+
+
+def open_alarms(db: Session, gyro_ids: Sequence[int], method: str) -> Mapping[int, int]:
+    """How many alarms are open of each of these gyros."""
+    rows = db.execute(
+        sa.select(Alarm.gyro_id, sa.func.count())
+        .where(Alarm.gyro_id.in_(gyro_ids), Alarm.method == method, Alarm.state == "open")
+        .group_by(Alarm.gyro_id)
+    )
+    return {row[0]: row[1] for row in rows}
+
+
+def results_of(db: Session, calibration_ids: Sequence[int]) -> Mapping[int, Calibration]:
+    """These results."""
+    rows = db.scalars(sa.select(Calibration).where(Calibration.id.in_(calibration_ids)))
+    return {row.id: row for row in rows}

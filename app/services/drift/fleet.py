@@ -1,0 +1,100 @@
+"""All gyros of a type: where each stands, where it goes, how it repeats, and what they have in common.
+
+Values are those of each gyro's last sound calibration (`due`); drift rates, repeatability and recommended
+intervals come from the stored studies, so that the cost does not grow with the length of histories.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from statistics import median
+from typing import Any, Final
+
+from app.errors import NotFound, problem
+from app.services import verdicts
+from app.services.drift import due, fleet_statistics
+from app.services.drift.due import Due
+from app.services.drift.fleet_views import Fleet, FleetGyro, Standing, TypeInterval
+from app.services.lab import Work
+from app.services.views import ParameterView
+from app.store import equipment
+from app.store import fleet as stored
+from app.store.fleet import Studied
+from app.store.tables import Calibration
+
+METHOD: Final = "least-squares"
+Document = Mapping[str, Any]
+
+
+def fleet(work: Work, type_name: str) -> Fleet:
+    """Everything about the gyros of a type, by serial number.
+
+    Raises
+    ------
+    NotFound
+        There is no such type.
+    """
+    kind = equipment.gyro_type(work.db, type_name)
+    if kind is None:
+        raise NotFound(problem("unknown-type", "There is no type %(name)s.", name=type_name))
+    holds = due.due_list(work, type_name=type_name)
+    ids = {row.serial: row.gyro_id for row in stored.last_sound(work.db, type_name=type_name)}
+    studies = {row.gyro_id: row for row in stored.studies_of(work.db, list(ids.values()), METHOD)}
+    alarms = stored.open_alarms(work.db, list(ids.values()), METHOD)
+    results = stored.results_of(work.db, [item.calibration for item in holds if item.calibration is not None])
+    gyros = tuple(
+        _gyro(
+            item,
+            results.get(item.calibration or 0),
+            studies.get(ids[item.gyro]),
+            alarms.get(ids[item.gyro], 0),
+        )
+        for item in sorted(holds, key=lambda item: item.gyro)
+    )
+    documents = [json.loads(row.document) for row in studies.values() if row.document is not None]
+    return Fleet(
+        type=kind.name, method=METHOD, gyros=gyros,
+        distributions=fleet_statistics.distributions(gyros),
+        pooled=fleet_statistics.pooled(documents),
+        correlations=fleet_statistics.correlations(gyros),
+        interval=_interval(kind.interval_days, gyros), counts=due.counts(holds),
+    )  # fmt: skip
+
+
+def _gyro(holds: Due, result: Calibration | None, study: Studied | None, alarms: int) -> FleetGyro:
+    document: Document = json.loads(study.document) if study and study.document else {}
+    found = verdicts.summary(result) if result else None
+    views = found.parameters if found else {}
+    interval = document.get("interval") or {}
+    return FleetGyro(
+        due=holds, verdict=found.verdict if found else None,
+        parameters={
+            name: standing(view, document.get("parameters", {}).get(name) or {}) for name, view in views.items()
+        },
+        sessions=document.get("sessions"), recommended_days=interval.get("recommended_days"), alarms=alarms,
+        up_to_date=study is None or study.up_to_date,
+    )  # fmt: skip
+
+
+def standing(view: ParameterView, study: Document) -> Standing:
+    """One parameter of one gyro, from its value and from what its study found."""
+    trend, together = study.get("trend") or {}, study.get("together") or {}
+    return Standing(
+        value=view, standing=_standing(view),
+        slope=trend.get("slope_per_year"), u_slope=trend.get("u_slope_per_year"), p_slope=trend.get("p_value"),
+        scatter=together.get("sd"), scatter_dof=together.get("dof"),
+        repeatability=study.get("repeatability_verdict"), steps=len(study.get("changes") or ()),
+    )  # fmt: skip
+
+
+def _standing(view: ParameterView) -> float | None:
+    if view.value is None or view.low is None or view.high is None:
+        return None
+    return abs(2.0 * view.value - view.high - view.low) / (view.high - view.low)
+
+
+def _interval(stated: int | None, gyros: Sequence[FleetGyro]) -> TypeInterval:
+    days = {item.serial: item.recommended_days for item in gyros if item.recommended_days is not None}
+    if not days:
+        return TypeInterval(stated, None, None, None, 0)
+    shortest = min(days, key=lambda serial: days[serial])
+    return TypeInterval(stated, days[shortest], shortest, round(median(days.values())), len(days))
