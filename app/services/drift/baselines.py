@@ -114,15 +114,15 @@ def freeze(
     access.require_judge(work.person)
     gyro = find_gyro(work, serial)
     chosen_rules = charting.checked(charting.DEFAULT_RULES if rules is None else rules)
-    _check(parameters, estimator, limits, reason)
-    table = _chosen(series.load(work, gyro.id, method), calibrations)
+    check(parameters, estimator, limits, reason)
+    table = chosen(series.load(work, gyro.id, method), calibrations)
     begin = valid_from or aware(table["measured_at"][0])
     rows = [
         Baseline(
             gyro_id=gyro.id, parameter=name, method=method, valid_from=begin,
             calibrations=table["calibration"].tolist(), limits=limits, rules=chosen_rules,
             reason=reason.strip(), frozen_at=work.now, frozen_by=work.person.name,
-            **_numbers(table, name, estimator),
+            **numbers(table, name, estimator),
         )
         for name in parameters
     ]  # fmt: skip
@@ -133,7 +133,8 @@ def freeze(
     return _views(work, rows, serial)
 
 
-def _check(parameters: Sequence[str], estimator: str, limits: str, reason: str) -> None:
+def check(parameters: Sequence[str], estimator: str, limits: str, reason: str = "") -> None:
+    """Raise `Invalid` for a name that there is not, a parameter named twice or none, a reason too long."""
     for value, known, column in (
         *((name, PARAMETERS, "parameters") for name in parameters),
         (estimator, ESTIMATORS, "estimator"),
@@ -150,7 +151,8 @@ def _check(parameters: Sequence[str], estimator: str, limits: str, reason: str) 
                               most=_LONGEST))  # fmt: skip
 
 
-def _chosen(table: SeriesTable, calibrations: Sequence[int]) -> SeriesTable:
+def chosen(table: SeriesTable, calibrations: Sequence[int]) -> SeriesTable:
+    """The sessions of these results; `Invalid` when one does not count, or when they are too few."""
     wanted = set(calibrations)
     unknown = sorted(wanted - set(table["calibration"].tolist()))
     if unknown:
@@ -162,7 +164,8 @@ def _chosen(table: SeriesTable, calibrations: Sequence[int]) -> SeriesTable:
     return table.rows(np.isin(table["calibration"], sorted(wanted)))
 
 
-def _numbers(table: SeriesTable, name: str, estimator: str) -> dict[str, Any]:
+def numbers(table: SeriesTable, name: str, estimator: str) -> dict[str, Any]:
+    """What a baseline of these sessions is for a parameter; `Invalid` when they give none."""
     history = table.history(name)
     if len(history) < FEWEST:
         raise Invalid(problem("baseline-undetermined", "Only %(count)d of these sessions determine %(parameter)s; a "
