@@ -113,7 +113,7 @@ def store(work: Work, session_id: int, wanted: Mapping[str, Any], output: Mappin
     if output["attitude"] is not None:
         work.db.add(StandAttitude(calibration_id=row.id, **output["attitude"]))
     by = {item["method"] for item in output["parameters"]}
-    following.changed(work, session.gyro_id, methods=by, stand_id=session.stand_id)
+    following.changed(work, session.gyro_id, methods=by)
     return row.id
 
 

@@ -120,3 +120,30 @@ def results_of(db: Session, calibration_ids: Sequence[int]) -> Mapping[int, Cali
     """These results."""
     rows = db.scalars(sa.select(Calibration).where(Calibration.id.in_(calibration_ids)))
     return {row.id: row for row in rows}
+
+
+class OnStand(NamedTuple):
+    """A gyro that was measured on a stand, with the columns of its own study (Arrow)."""
+
+    serial: str
+    kind: str
+    check: bool
+    series: bytes
+
+
+def series_on(db: Session, stand_id: int, method: str) -> Sequence[OnStand]:
+    """The gyros of a stand by serial number, those that have been studied."""
+    used = sa.select(MeasuringSession.gyro_id).where(MeasuringSession.stand_id == stand_id).distinct()
+    rows = db.execute(
+        sa.select(Gyro.serial, GyroType.name, Gyro.check, DriftStudy.series)
+        .join(GyroType, GyroType.id == Gyro.type_id)
+        .join(DriftStudy, DriftStudy.gyro_id == Gyro.id)
+        .where(Gyro.id.in_(used), DriftStudy.method == method, DriftStudy.series.is_not(None))
+        .order_by(Gyro.serial)
+    )
+    return [OnStand._make(row) for row in rows]
+
+
+def stand_by_id(db: Session, stand_id: int) -> Stand:
+    """The stand of that id, which must be there."""
+    return db.get_one(Stand, stand_id)

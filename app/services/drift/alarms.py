@@ -26,7 +26,7 @@ SEVERITIES: Final = ("serious", "warning", "notice")
 _SERIOUS: Final = frozenset({"out-of-limits", "step", "beyond-limits"})
 _WARNING: Final = frozenset({"limit-ahead", "trend", "ewma", "cusum", "repeatability"})
 _SEPARATE: Final = frozenset({"step"})
-"""Kinds of which two may be open at once: an open one takes in only what may be the same."""
+"""Kinds of which two may be open at once, as of a stand all: an open one takes in only what may be the same."""
 _LONGEST: Final = 4000
 
 
@@ -103,7 +103,7 @@ def take_in(work: Work, study: DriftStudy, findings: Sequence[Finding], counting
 def _is_same(alarm: Alarm, finding: Finding, times: Mapping[int, datetime]) -> bool:
     if (alarm.parameter, alarm.kind) != (finding.parameter, finding.kind):
         return False
-    if alarm.state == "open" and alarm.kind not in _SEPARATE:
+    if alarm.state == "open" and alarm.kind not in _SEPARATE and not alarm.kind.startswith("stand-"):
         return True
     since, until = datetime.fromisoformat(finding.since), datetime.fromisoformat(finding.until)
     return alarm.state in ("open", "acknowledged") and (

@@ -17,31 +17,37 @@ from app.store import drift
 from app.store.tables import DriftStudy
 
 KIND: Final = "follow"
+STAND_METHOD: Final = "least-squares"
+"""By which a stand's gyros are studied together."""
 Subject = Mapping[str, int]
-FOLLOWED: Final = ("gyro",)
-"""Kinds of subjects that are studied."""
 
 
-def changed(work: Work, gyro_id: int, *, methods: Iterable[str] = (), stand_id: int | None = None) -> None:
+def changed(work: Work, gyro_id: int, *, methods: Iterable[str] = ()) -> None:
     """Something came in for a gyro: a result by these methods, an event, a baseline, other limits.
 
     Parameters
     ----------
     methods
         Those that may be new to the gyro; every study that is there is counted anyway.
-    stand_id
-        The stand that a result came from: its study has to be made anew as well.
     """
     _count(work, {"gyro": gyro_id}, methods)
-    if stand_id is not None:
-        _count(work, {"stand": stand_id}, methods)
+
+
+def studied_gyro(work: Work, gyro_id: int, methods: Iterable[str]) -> None:
+    """A gyro's study was made by these methods: the stands it was measured on are studied from it."""
+    if STAND_METHOD in methods:
+        for stand in drift.stands_of(work.db, gyro_id):
+            _count(work, {"stand": stand.id}, (STAND_METHOD,))
 
 
 def changed_stand(work: Work, stand_id: int) -> None:
-    """Something happened to a stand; its own study and those of the gyros measured there take it in."""
-    _count(work, {"stand": stand_id}, ())
+    """Something happened to a stand; its own study and those of the gyros measured there take it in.
+
+    Gyros before stands, as everywhere: whoever locks rows in one order waits for nobody in a circle.
+    """
     for gyro_id in drift.gyros_on(work.db, stand_id):
         _count(work, {"gyro": gyro_id}, ())
+    _count(work, {"stand": stand_id}, ())
 
 
 def changed_type(work: Work, type_id: int) -> None:
@@ -58,8 +64,6 @@ def ids(subject: Subject) -> tuple[int | None, int | None]:
 def _count(work: Work, subject: Subject, methods: Iterable[str]) -> None:
     """Count a change of every study of the subject; one job will take them all in."""
     gyro_id, stand_id = ids(subject)
-    if not set(subject) <= set(FOLLOWED):
-        return
     drift.locked(work.db, gyro_id, stand_id)
     rows = list(drift.studies(work.db, gyro_id, stand_id))
     for row in rows:

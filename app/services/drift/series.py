@@ -1,8 +1,8 @@
 """A gyro's results over time as columns: from the database, to and from Arrow, grouped, and reduced.
 
-A row is a session. Of its results that one counts which `app.store.results.series` names: by the
-method, the highest revision from the same input as the session's highest revision. What a corrected
-measurement has replaced is gone, and is counted in `revisions` only.
+A row is a session. Of its results one counts: by the method, the highest revision from the same input as the
+session's highest revision. What a corrected measurement has replaced is gone, and is counted in `revisions`
+only; but solving once more by another method hides nothing.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -23,7 +23,10 @@ from solver.records import PARAMETERS, Array
 
 Column = NDArray[Any]
 
-ATTITUDE: Final = ("azimuth_arcsec", "u_azimuth_arcsec", "level_north_arcsec", "u_level_north_arcsec")
+ATTITUDE: Final = (
+    "azimuth_arcsec", "u_azimuth_arcsec", "level_north_arcsec", "u_level_north_arcsec", "attitude_correlation",
+    "u_certificate_azimuth_arcsec", "u_certificate_level_north_arcsec",
+)  # fmt: skip
 """How the stand's base stood according to each session; NaN where the session shows nothing."""
 PARTS: Final = ("value", "u", "k", "u_noise")
 _EPOCH: Final = np.datetime64(0, "us")
@@ -121,6 +124,19 @@ def aware(at: np.datetime64) -> datetime:
 def iso(at: np.datetime64) -> str:
     """A column's time as ISO 8601 in UTC."""
     return aware(at).isoformat()
+
+
+def known(column: Column) -> list[float | None]:
+    """Numbers, None for NaN."""
+    return [None if number != number else number for number in column.tolist()]
+
+
+def current(work: Work, gyro_id: int, method: str) -> SeriesTable:
+    """A gyro's results by one method as they are now: from the study when it has taken everything in."""
+    study = drift.study(work.db, gyro_id, None, method)
+    if study is not None and study.studied >= study.changed and study.series is not None:
+        return decode(study.series)
+    return load(work, gyro_id, method)
 
 
 def load(work: Work, gyro_id: int, method: str) -> SeriesTable:

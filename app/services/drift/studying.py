@@ -7,7 +7,7 @@ knows no database. A study of a stand has the same three steps in `app.services.
 from collections.abc import Callable, Mapping
 from typing import Any, Final, Protocol
 
-from app.services.drift import alarms, following, gyro_study
+from app.services.drift import alarms, following, gyro_study, stand_study
 from app.services.drift.alarms import Finding
 from app.services.lab import Work
 from app.store import drift
@@ -25,7 +25,7 @@ class _Steps(Protocol):
         """By method: ``document``, ``series``, ``solver_version``, ``findings``, ``counting``."""
 
 
-_STEPS: Final[Mapping[str, _Steps]] = {"gyro": gyro_study}
+_STEPS: Final[Mapping[str, _Steps]] = {"gyro": gyro_study, "stand": stand_study}
 
 
 def prepare(work: Work, _session_id: int | None, request: following.Subject) -> dict[str, Any]:
@@ -58,6 +58,8 @@ def store(
         )
         alarms.take_in(work, row, [Finding(**item) for item in made["findings"]], made["counting"])
     work.db.flush()
+    if gyro_id is not None:
+        following.studied_gyro(work, gyro_id, output["studies"])
     return None
 
 
@@ -73,11 +75,12 @@ class NoJobs:
 
 def follow_all_now(work: Work) -> None:
     """Make every study that is behind, at once and in this process, and end the jobs that wait to."""
-    rows = drift.behind(work.db)
-    gyros = {row.gyro_id for row in rows if row.gyro_id is not None}
-    stands = {row.stand_id for row in rows if row.stand_id is not None}
-    for subject in (*({"gyro": key} for key in sorted(gyros)), *({"stand": key} for key in sorted(stands))):
-        _now(work, subject)
+    rows = list(drift.behind(work.db))
+    for key in sorted({row.gyro_id for row in rows if row.gyro_id is not None}):
+        _now(work, {"gyro": key})
+    rows += [row for row in drift.behind(work.db) if row.stand_id is not None]
+    for key in sorted({row.stand_id for row in rows if row.stand_id is not None}):
+        _now(work, {"stand": key})
     for job in drift.jobs(work.db, {row.job_id for row in rows if row.job_id is not None}):
         job.state, job.started_at, job.finished_at, job.progress = "succeeded", work.now, work.now, 1.0
 
