@@ -59,6 +59,10 @@ class Part(IntEnum):
     """White rate noise just before a record, backwards: what the loop still answers (axis, position, repeat)."""
     LIVE_READING = 22
     """White noise of a reading outside a record (number of the start, tenths of a second since power-up)."""
+    LIFE_NOISE = 23
+    """White rate noise of all means of one session in a laboratory's life (number of the session)."""
+    LIFE_DATES = 24
+    """When in its month each gyro of a laboratory is measured ()."""
 
 
 def _sequence(seed: int, part: Part, key: tuple[int, ...]) -> np.random.SeedSequence:
