@@ -1,6 +1,6 @@
 """Alarms: what the studies found, and what people answered."""
 
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 
@@ -9,7 +9,6 @@ from app.api.pagination import TABLE_TOO, Columns, Listing, Part, listed
 from app.api.schemas.common import Id, Name, OptionalText
 from app.api.schemas.drift import Acknowledgement, Alarm
 from app.services.drift import alarms
-from app.services.drift.views import AlarmView
 
 router = APIRouter(tags=["drift"])
 
@@ -59,25 +58,19 @@ def listing(which: Annotated[Which, Query()], caller: Reader, request: Request) 
             state=None if which.state == "any" else which.state,
         )  # fmt: skip
     following = str(start + which.limit) if len(found) > which.limit else None
-    return listed(request, [_shown(item) for item in found[: which.limit]], following, _COLUMNS)
+    shown = [Alarm.model_validate(item) for item in found[: which.limit]]
+    return listed(request, shown, following, _COLUMNS)
 
 
 @router.get("/alarms/{number}", responses={404: {}})
 def detail(number: Id, caller: Reader) -> Alarm:
     """One alarm."""
     with caller.read() as work:
-        return _shown(alarms.alarm(work, number))
+        return Alarm.model_validate(alarms.alarm(work, number))
 
 
 @router.post("/alarms/{number}/acknowledgement", responses={404: {}, 409: {}})
 def acknowledge(number: Id, body: Acknowledgement, caller: Uploader) -> Alarm:
     """Answer for an alarm; for accounts with the role metrologist, quality or admin."""
     with caller.write() as work:
-        return _shown(alarms.acknowledge(work, number, body.cause, body.note))
-
-
-def _shown(view: AlarmView) -> Alarm:
-    fields: dict[str, Any] = {name: getattr(view, name) for name in AlarmView.__slots__}
-    return Alarm.model_validate(
-        fields | {"detail": view.template % view.values if view.values else view.template}
-    )
+        return Alarm.model_validate(alarms.acknowledge(work, number, body.cause, body.note))

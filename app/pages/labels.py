@@ -69,11 +69,12 @@ _ORIGINS: Final = {
 _KINDS: Final = {
     "calibrate": marked("Calibration"), "import": marked("Reading of records"),
     "simulate": marked("Simulation"), "validate": marked("Validation"),
+    "follow": marked("Study of drift"),
 }  # fmt: skip
 
 _PHASES: Final = {
     "": "", "solving": marked("solving"), "simulating": marked("simulating"), "reading": marked("reading"),
-    "keeping": marked("keeping the records"), "drawing": marked("drawing"),
+    "keeping": marked("keeping the records"), "drawing": marked("drawing"), "studying": marked("studying the drift"),
 }  # fmt: skip
 
 

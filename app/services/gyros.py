@@ -6,6 +6,7 @@ from typing import Final
 
 from app.errors import Conflict, Invalid, problem
 from app.services import verdicts
+from app.services.drift import following
 from app.services.finding import find_gyro
 from app.services.lab import Work
 from app.services.names import checked_name
@@ -45,6 +46,8 @@ def change_gyro(
     if check is not None:
         row.check = check
     work.db.flush()
+    if type_name is not None:
+        following.changed(work, row.id)
     return gyro(work, serial)
 
 
@@ -120,6 +123,7 @@ def set_limits(
         for name, (low, high) in limits.items()
     )
     work.db.flush()
+    following.changed_type(work, kind.id)
 
 
 def _check_repeatability(spread: Mapping[str, float], limits: Mapping[str, tuple[float, float]]) -> None:
@@ -143,8 +147,10 @@ def set_interval(work: Work, type_name: str, days: int | None) -> None:
     if days is not None and not 1 <= days <= LONGEST_INTERVAL_DAYS:
         raise Invalid(problem("bad-interval", "An interval has 1 to %(most)d days.", column="interval_days",
                               most=LONGEST_INTERVAL_DAYS))  # fmt: skip
-    _find_or_add_type(work, type_name).interval_days = days
+    kind = _find_or_add_type(work, type_name)
+    kind.interval_days = days
     work.db.flush()
+    following.changed_type(work, kind.id)
 
 
 def set_nominals(work: Work, type_name: str, nominals: Mapping[str, Nominal]) -> None:

@@ -44,6 +44,9 @@ class ResultRow(NamedTuple):
     u_azimuth_arcsec: float | None
     level_north_arcsec: float | None
     u_level_north_arcsec: float | None
+    attitude_correlation: float | None
+    u_certificate_azimuth_arcsec: float | None
+    u_certificate_level_north_arcsec: float | None
     level_east: dict[str, float] | None
 
 
@@ -67,7 +70,9 @@ def result_rows(db: Session, gyro_id: int) -> Sequence[ResultRow]:
             Calibration.solver_version, Calibration.chi2, Calibration.fit_dof, MeasuringSession.started_at,
             MeasuringSession.temperature_c, Start.number, Start.powered_up_at, Stand.name,
             StandCertificate.number, StandAttitude.azimuth_arcsec, StandAttitude.u_azimuth_arcsec,
-            StandAttitude.level_north_arcsec, StandAttitude.u_level_north_arcsec, StandAttitude.level_east,
+            StandAttitude.level_north_arcsec, StandAttitude.u_level_north_arcsec, StandAttitude.correlation,
+            StandAttitude.u_certificate_azimuth_arcsec, StandAttitude.u_certificate_level_north_arcsec,
+            StandAttitude.level_east,
         )
         .select_from(MeasuringSession)
         .join(Calibration, Calibration.session_id == MeasuringSession.id)

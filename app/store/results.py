@@ -8,7 +8,6 @@ from sqlalchemy.orm import Session, aliased
 
 from app.store.tables import (
     Calibration,
-    CalibrationParameter,
     Gyro,
     GyroType,
     IdempotentReply,
@@ -104,14 +103,24 @@ def calibrations(
 
 
 def newest_of_gyros(db: Session, gyro_ids: Sequence[int]) -> Mapping[int, Calibration]:
-    """Of each gyro the result of its latest session that has one."""
-    newest = sa.select(sa.func.max(Calibration.id)).group_by(Calibration.session_id)
-    rows = db.scalars(
-        sa.select(Calibration)
+    """Of each gyro the newest result of its latest session that has one.
+
+    A gyro's sessions are walked backwards along their index up to the first with a result, so that a long
+    history costs no more than a short one.
+    """
+    newest = (
+        sa.select(Calibration.id)
         .join(MeasuringSession, MeasuringSession.id == Calibration.session_id)
-        .where(Calibration.id.in_(newest), MeasuringSession.gyro_id.in_(gyro_ids))
-        .order_by(MeasuringSession.started_at)
+        .where(MeasuringSession.gyro_id == Gyro.id)
+        .order_by(
+            MeasuringSession.started_at.desc(), Calibration.session_id.desc(), Calibration.revision.desc()
+        )
+        .limit(1)
+        .correlate(Gyro)
+        .scalar_subquery()
     )
+    ids = sa.select(newest).where(Gyro.id.in_(gyro_ids))
+    rows = db.scalars(sa.select(Calibration).where(Calibration.id.in_(ids)))
     return {row.session.gyro_id: row for row in rows}
 
 
@@ -119,63 +128,17 @@ def earlier_calibrations(
     db: Session, gyro_id: int, before: datetime, limit: int = 5
 ) -> Sequence[Calibration]:
     """Newest results of the gyro's sessions that began before a time, the latest session first."""
-    newest = sa.select(sa.func.max(Calibration.id)).group_by(Calibration.session_id)
+    later = aliased(Calibration)
+    replaced = sa.exists().where(
+        later.session_id == Calibration.session_id, later.revision > Calibration.revision
+    )
     return db.scalars(
         sa.select(Calibration)
         .join(MeasuringSession, MeasuringSession.id == Calibration.session_id)
-        .where(
-            Calibration.id.in_(newest),
-            MeasuringSession.gyro_id == gyro_id,
-            MeasuringSession.started_at < before,
-        )
+        .where(MeasuringSession.gyro_id == gyro_id, MeasuringSession.started_at < before, ~replaced)
         .order_by(MeasuringSession.started_at.desc())
         .limit(limit)
     ).all()
-
-
-def series(
-    db: Session,
-    gyro_id: int,
-    *,
-    method: str = "least-squares",
-    parameter: str | None = None,
-    since: datetime | None = None,
-    until: datetime | None = None,
-) -> Sequence[tuple[CalibrationParameter, Calibration]]:
-    """One method's parameters of a gyro over time, of each session the highest revision that used it.
-
-    Only results from the same input as the session's highest revision count: what a corrected
-    measurement has replaced is gone, but solving once more by another method hides nothing.
-    """
-    last = sa.select(sa.func.max(Calibration.id)).group_by(Calibration.session_id)
-    latest = aliased(Calibration)
-    newest = (
-        sa.select(sa.func.max(Calibration.id))
-        .join(CalibrationParameter, CalibrationParameter.calibration_id == Calibration.id)
-        .join(
-            latest,
-            sa.and_(latest.session_id == Calibration.session_id, latest.input_hash == Calibration.input_hash),
-        )
-        .join(MeasuringSession, MeasuringSession.id == Calibration.session_id)
-        .where(
-            MeasuringSession.gyro_id == gyro_id, latest.id.in_(last), CalibrationParameter.method == method
-        )
-        .group_by(Calibration.session_id)
-    )
-    query = (
-        sa.select(CalibrationParameter, Calibration)
-        .join(Calibration, Calibration.id == CalibrationParameter.calibration_id)
-        .join(MeasuringSession, MeasuringSession.id == Calibration.session_id)
-        .where(Calibration.id.in_(newest), CalibrationParameter.method == method)
-        .order_by(MeasuringSession.started_at, CalibrationParameter.id)
-    )
-    if parameter is not None:
-        query = query.where(CalibrationParameter.parameter == parameter)
-    if since is not None:
-        query = query.where(MeasuringSession.started_at >= since)
-    if until is not None:
-        query = query.where(MeasuringSession.started_at <= until)
-    return [(point, result) for point, result in db.execute(query)]
 
 
 def reply(db: Session, account: str, key: str) -> IdempotentReply | None:

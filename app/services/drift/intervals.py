@@ -9,13 +9,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from app.exchange.json_values import Json, message_json
+from app.exchange.json_values import Json
 from app.exchange.si import PARAMETER_UNITS
 from app.services.drift.courses import DAY, HORIZON
 from app.services.drift.series import Column, SeriesTable, seconds
 from solver.drift.in_use import Use
 from solver.drift.interval_evidence import Check, Evidence, Findings, Outlook
 from solver.drift.recalibration import MethodAdvice, recommend
+from solver.errors import Message
 from solver.records import Array
 
 _FEWEST: Final = 2
@@ -53,7 +54,7 @@ def interval(
     )
     found = recommend(evidence)
     return {
-        "stated_days": stated_days, "recommended_days": found.days, "reason": message_json(found.reason),
+        "stated_days": stated_days, "recommended_days": found.days, "reason": _reason(found.reason),
         "methods": [_advice(item) for item in found.methods],
     }  # fmt: skip
 
@@ -108,8 +109,12 @@ def _checks(entries: Mapping[str, Json], limited: Mapping[str, tuple[float, floa
         yield Check(name, together["sd"], margin, drift, PARAMETER_UNITS[name][0])
 
 
+def _reason(message: Message) -> Json:
+    return {"code": message.code, "template": message.template, "values": dict(message.values)}
+
+
 def _advice(item: MethodAdvice) -> dict[str, Any]:
     return {
         "method": item.method, "days": None if item.days is None else round(item.days),
-        "interval_of": item.interval_of, "reason": message_json(item.reason),
+        "interval_of": item.interval_of, "reason": _reason(item.reason),
     }  # fmt: skip

@@ -125,6 +125,11 @@ class AlarmView:
     cause: str | None
     note: str
 
+    @property
+    def detail(self) -> str:
+        """Its sentence in English."""
+        return self.template % self.values if self.values else self.template
+
 
 @dataclass(frozen=True, slots=True)
 class DriftPoint:
