@@ -18,9 +18,11 @@ from fastapi.staticfiles import StaticFiles
 from app.pages import (
     alarms,
     assets,
+    baselines,
     certificates,
     choices,
     compare,
+    drift,
     entry,
     errors,
     events,
@@ -50,8 +52,10 @@ __all__ = ["errors", "mount", "router"]
 
 router = APIRouter(include_in_schema=False)
 for _noun in (
-    today, sessions, session_files, entry, live, results, measurements, gyros, history, events, alarms, types,
-    fleet, compare, stands, planning, uncertainty, certificates, simulations, jobs, method, loop, validation, sign_in, choices, assets,
+    today, sessions, session_files, entry, live, results, measurements, gyros, history, drift, baselines, events,
+    alarms, types,
+    fleet, compare, stands, planning, uncertainty, certificates, simulations, jobs, method, loop, validation,
+    sign_in, choices, assets,
 ):  # fmt: skip
     router.include_router(_noun.router)
 

@@ -7,11 +7,13 @@ from typing import Final
 from markupsafe import Markup, escape
 
 from app import figures
-from app.i18n import gettext, marked
+from app.i18n import gettext, marked, translate
 from app.pages import labels
 from app.pages.labels import Mark
 from app.services.drift.due import Due
 from app.services.drift.views import EventView
+from solver.drift.false_alarms import Chances
+from solver.drift.run_rules import RULES
 
 ALARM_KINDS: Final = {
     "out-of-limits": Mark("out", marked("Out of limits")),
@@ -32,24 +34,8 @@ ALARM_KINDS: Final = {
 _SHORT: Final = 10
 _RUN: Final = Mark("attention", marked("Not by chance"))
 _SHAPES: Final = {"serious": "out", "warning": "attention", "notice": "due"}
-BEYOND: Final = frozenset({"beyond-limits", "nelson-1", "western-electric-1"})
-"""Signals of a value that lies beyond its own control limits."""
-
-RULES: Final = {
-    "nelson-1": marked("one value beyond the control limits"),
-    "nelson-2": marked("nine in a row on one side of the centre"),
-    "nelson-3": marked("six in a row, each higher or each lower than the last"),
-    "nelson-4": marked("fourteen in a row, up and down in turn"),
-    "nelson-5": marked("two of three beyond two standard deviations on one side"),
-    "nelson-6": marked("four of five beyond one standard deviation on one side"),
-    "nelson-7": marked("fifteen in a row within one standard deviation"),
-    "nelson-8": marked("eight in a row beyond one standard deviation on either side"),
-    "western-electric-1": marked("one value beyond the control limits"),
-    "western-electric-2": marked("two of three beyond two standard deviations on one side"),
-    "western-electric-3": marked("four of five beyond one standard deviation on one side"),
-    "western-electric-4": marked("eight in a row on one side of the centre"),
-}
-"""Run rules in words; pass through `rule`."""
+BEYOND: Final = "nelson-1"
+"""Signal of a value that lies beyond its own control limits."""
 
 CAUSES: Final = {
     "gyro": marked("The gyro itself"), "stand": marked("The stand"), "certificate": marked("The stand’s certificate"),
@@ -115,12 +101,30 @@ def alarm_state(state: str) -> Mark:
 
 def is_beyond(signals: tuple[str, ...]) -> bool:
     """Whether a value lies beyond its own control limits."""
-    return bool(BEYOND & set(signals))
+    return BEYOND in signals
 
 
 def rule(name: str) -> str:
-    """A run rule in words."""
-    return gettext(RULES.get(name, name))
+    """A run rule in words; ``ewma`` and ``cusum`` are rules of their charts."""
+    if name in RULES:
+        return translate(RULES[name].description)
+    return alarm(name).word
+
+
+def chart_rule(name: str) -> str:
+    """A rule to choose: a pattern of single values, or a chart that watches for small shifts."""
+    charts = {"ewma": gettext("EWMA: a weighted average beyond its limits"),
+              "cusum": gettext("CUSUM: a cumulative sum beyond its decision interval")}  # fmt: skip
+    return charts.get(name) or rule(name)
+
+
+def chances(found: Chances) -> str:
+    """How often the charts chosen alarm for nothing."""
+    if not found.rate > 0.0:
+        return gettext("No rule is chosen: nothing will raise an alarm.")
+    return gettext(
+        "While the gyro is well, expect one false alarm in about %(count)s sessions of each parameter."
+    ) % {"count": figures.significant(float(f"{found.values_between:.2g}"), 4)}
 
 
 def cause(name: str) -> str:

@@ -94,7 +94,8 @@ def chart(
         _description(found, item),
         stretches=stretches(item, found.baselines, window, "individuals"),
         changes=list(_steps(study, item, window)),
-        forecast=_forecast(study, window, named=named),
+        forecast=_forecast(study, window),
+        today=_today(window, named=named),
         with_dates=with_dates,
         height=height,
     )
@@ -227,14 +228,20 @@ def explained(change: Mapping[str, Any]) -> bool:
     return bool(change.get("event") or change.get("event_kind"))
 
 
-def _forecast(study: Mapping[str, Any], window: Window, *, named: bool) -> plots.Forecast | None:
+def _forecast(study: Mapping[str, Any], window: Window) -> plots.Forecast | None:
+    """As far as the panel goes, and the first moment beyond it."""
     found = study.get("forecast")
     if not found or not found["low"]:
         return None
     moments = [datetime.fromisoformat(text) for text in found["at"]]
-    return plots.Forecast(
-        moments, found["value"], found["low"], found["high"], gettext("today") if named else ""
-    )
+    shown = sum(moment < window.end for moment in moments) + 1
+    return plots.Forecast(moments[:shown], *(found[name][:shown] for name in ("value", "low", "high")))
+
+
+def _today(window: Window, *, named: bool) -> plots.DriftEvent | None:
+    if not window.begin < window.now < window.end:
+        return None
+    return plots.DriftEvent(window.now, gettext("today") if named else "")
 
 
 def status(item: ParameterDrift, alarms: Sequence[AlarmView], window: Window) -> Mark:

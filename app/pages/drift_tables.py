@@ -20,6 +20,7 @@ SOURCES: Final = (
     "between-days",
 )
 Entry = Mapping[str, Any]
+_LEVEL: Final = 0.05
 
 
 def by_session(
@@ -54,7 +55,9 @@ def trends(found: GyroDrift) -> list[Trend]:
 
 
 def _trend(item: ParameterDrift, study: Entry) -> Trend:
-    steps = [change for change in study.get("changes", ()) if change["kind"] == "step"]
+    steps = [
+        change for change in study.get("changes", ()) if change["kind"] == "step" and _is_significant(change)
+    ]
     last = steps[-1] if steps else None
     ahead = study.get("forecast")
     return Trend(
@@ -69,6 +72,11 @@ def _trend(item: ParameterDrift, study: Entry) -> Trend:
     )
 
 
+def _is_significant(change: Entry) -> bool:
+    """A repair lets the level change; it need not have."""
+    return change["p_value"] is not None and change["p_value"] < _LEVEL
+
+
 @dataclass(frozen=True, slots=True)
 class Share:
     """Scatter of one source: standard deviation, its interval, p of the F-test."""
@@ -76,7 +84,7 @@ class Share:
     source: str
     sd: Figure
     interval: str
-    p: str
+    p: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +113,8 @@ class Repeatability:
 def repeatability(found: GyroDrift) -> Repeatability:
     """Scatter by source, as far as the sessions tell it."""
     studied = [item for item in found.parameters if item.study and item.study.get("components")]
-    known = {part["source"] for item in studied for part in (item.study or {})["components"]}
+    parts = [part for item in studied for part in (item.study or {})["components"]]
+    known = {part["source"] for part in parts if part["sd"] is not None}
     sources = tuple(source for source in SOURCES if source in known)
     rows = tuple(_scatter(item, item.study or {}, sources) for item in studied)
     return Repeatability(sources, rows, _confounded(studied))
@@ -126,16 +135,10 @@ def _scatter(item: ParameterDrift, study: Entry, sources: Sequence[str]) -> Scat
 def _share(part: Entry | None, places: int) -> Share | None:
     if part is None or part.get("sd") is None:
         return None
-    low, high = part.get("low"), part.get("high")
-    interval = (
-        "" if low is None or high is None else f"{figures.figure(low, places)}–{figures.figure(high, places)}"
-    )
-    p = part.get("p_value")
-    said = "" if p is None else drift_words.probability(p)
-    return Share(
-        part["source"], figures.figure(part["sd"], places), interval,
-        said if said.startswith("<") or not said else f"= {said}",
-    )  # fmt: skip
+    ends = [figures.figure(part.get(name), places) for name in ("low", "high")]
+    known = part.get("low") is not None and part.get("high") is not None and ends[0] != ends[1]
+    interval = f"{ends[0]}–{ends[1]}" if known else ""
+    return Share(part["source"], figures.figure(part["sd"], places), interval, part.get("p_value"))
 
 
 _VERDICTS: Final = {

@@ -1,15 +1,18 @@
 """What a study found, in sentences: courses, forecasts, alarms, numbers down to the digits that they bear."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
 from typing import Any, Final
+
+from markupsafe import Markup
 
 from app import figures
 from app.i18n import gettext, translate
 from app.pages import drift_labels, labels
 from app.services.drift.views import AlarmView
 from app.services.views import COVERAGE_FACTOR
+from solver.drift.run_rules import RULES
 
 _WEEKS_FROM: Final = 21
 _DAYS_A_MONTH: Final = 365.25 / 12
@@ -69,9 +72,9 @@ def day(text: str | None) -> str:
 def alarm(found: AlarmView) -> str:
     """An alarm's sentence."""
     said = sentence(found.template, found.values)
-    return (
-        f"{drift_labels.rule(found.kind).capitalize()}. {said}" if found.kind in drift_labels.RULES else said
-    )
+    if found.kind in RULES and found.kind not in drift_labels.ALARM_KINDS:
+        return f"{drift_labels.rule(found.kind)} {said}"
+    return said
 
 
 def course(trend: Entry, unit: str) -> str:
@@ -135,8 +138,23 @@ def probability(value: float | None) -> str:
     return str(figures.figure(value, 3 if value < 0.1 else 2))
 
 
-def percent(value: float | None, digits: int = 2) -> str:
-    """A probability in percent: ``0.27 %``."""
+def p(value: float | None) -> Markup:
+    """A probability with its symbol: ``p = 0.032``."""
+    said = probability(value)
+    equals = "" if said.startswith("<") else "= "
+    return Markup('<span class="q">p</span> {}{}').format(equals, said)
+
+
+def percent(value: float | None) -> str:
+    """A probability in percent: ``98 %``, ``0.3 %``."""
     if value is None:
         return figures.DASH
-    return f"{figures.significant(100.0 * value, digits)}\u202f%"
+    hundred = 100.0 * value
+    return f"{figures.figure(hundred, 0 if hundred >= 9.95 else 1)}\u00a0%"
+
+
+def degrees_of_freedom(dof: float | Sequence[float] | None) -> str:
+    """Of a test: both numbers of an F."""
+    if dof is None:
+        return figures.DASH
+    return " / ".join(figures.significant(item, 3) for item in (dof if isinstance(dof, Sequence) else [dof]))

@@ -6,6 +6,7 @@ from datetime import UTC, date, datetime, time, timedelta
 from typing import Annotated, Any, Final, Literal
 
 from fastapi import APIRouter, Depends, Query, Request, Response
+from pydantic import BeforeValidator
 
 from app.figures import measured
 from app.pages import drift_labels, drift_panels, drift_tables, drift_words
@@ -30,13 +31,17 @@ _MOST_ROWS: Final = 50
 _SESSIONS: Final = 6
 
 
+Day = Annotated[date | None, BeforeValidator(lambda text: text or None)]
+"""A day of an address; a field left empty names none."""
+
+
 @dataclass(frozen=True, slots=True)
 class View:
     """What of a history is wanted: a period by its name or by its days, a grouping, a method."""
 
     period: Period = "year"
-    begin: Annotated[date | None, Query(alias="from")] = None
-    until: date | None = None
+    begin: Annotated[Day, Query(alias="from")] = None
+    until: Day = None
     by: Group = "session"
     method: Method = "least-squares"
 
@@ -99,11 +104,11 @@ def exported(
             by=wanted.by,
             most=None,
         )
-    rows = [_row(found, item, point) for item in found.parameters for point in item.points]
+    rows = [value_row(found, item, point) for item in found.parameters for point in item.points]
     if form == "json":
         return json_answer(rows)
     answer = csv_answer if form == "csv" else parquet_answer
-    return answer(rows, _COLUMNS, f"history-{serial}")
+    return answer(rows, COLUMNS, f"history-{serial}")
 
 
 @router.get("/gyros/{serial}/repeatability.csv")
@@ -162,7 +167,7 @@ def _newest(
     return drift_tables.by_session(found.parameters, _MOST_ROWS)
 
 
-_COLUMNS: Final = (
+COLUMNS: Final = (
     "gyro", "measured_at", "until", "sessions", "session", "start", "stand", "certificate", "result", "revision",
     "parameter", "value", "standard_uncertainty", "expanded_uncertainty", "coverage_factor",
     "standard_deviation", "unit", "low", "high", "verdict", "signals",
@@ -172,7 +177,8 @@ _SCATTER_COLUMNS: Final = (
 )  # fmt: skip
 
 
-def _row(found: GyroDrift, item: ParameterDrift, point: DriftPoint) -> Row:
+def value_row(found: GyroDrift, item: ParameterDrift, point: DriftPoint) -> Row:
+    """A point as a row of a file."""
     return {
         "gyro": found.gyro, "measured_at": point.at, "until": point.until, "sessions": point.sessions,
         "session": point.session, "start": point.start, "stand": point.stand, "certificate": point.certificate,

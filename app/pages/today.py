@@ -4,14 +4,18 @@ from datetime import UTC, datetime
 
 from fastapi import APIRouter, Request, Response
 
-from app.pages import live_view
+from app.pages import drift_labels, drift_words, live_view
 from app.pages.base import Reader, TheLab, render
 from app.pages.live import look
 from app.pages.live_map import Numbers
 from app.pages.positions import last_measured, next_position, position_map
 from app.services import gyros, overview, stands
+from app.services.drift import alarms
 
 router = APIRouter()
+
+_ALARMS = 4
+"""Shown on the first screen; the queue has the others."""
 
 
 @router.get("/")
@@ -21,6 +25,7 @@ def today(request: Request, person: Reader, lab: TheLab) -> Response:
         seen = overview.overview(work)
         has_gyro = bool(gyros.gyros(work, limit=1).items)
         known = stands.stands(work)
+        worst, counts = alarms.alarms(work, limit=_ALARMS), alarms.counts(work)
     current = seen.current
     run = current.session.station if current else None
     watched = (
@@ -33,5 +38,6 @@ def today(request: Request, person: Reader, lab: TheLab) -> Response:
         coming=next_position(current.positions) if current else None,
         last=last_measured(current) if current else None,
         map=position_map(current) if current else None, watched=watched, view=live_view,
+        worst=worst, open_count=sum(counts.values()), drift=drift_labels, words=drift_words,
         has_gyro=has_gyro, has_stand=bool(known), certified=any(item.certificate for item in known),
     )  # fmt: skip

@@ -32,6 +32,7 @@ def drift(
     stretches: Sequence[ControlStretch] = (),
     changes: Sequence[DriftChange] = (),
     forecast: Forecast | None = None,
+    today: DriftEvent | None = None,
     with_dates: bool = True,
     height: int | None = None,
 ) -> Spec:
@@ -45,6 +46,8 @@ def drift(
         Control limits, each over what it judges.
     forecast
         Drawn as far as it leaves the points legible: it widens the range by half at most.
+    today
+        Where what was measured ends.
     with_dates
         Whether the dates stand below: under the last panel of several.
     height
@@ -71,7 +74,7 @@ def drift(
             {"t": stamp(item.before), "t2": stamp(item.until), "text": item.label} for item in changes
         ],
         "forecast": list(_band(forecast)),
-        "today": _beginning(forecast),
+        "today": [{"t": stamp(item.moment), "text": item.label} for item in ([today] if today else [])],
     }  # fmt: skip
     spec = filled(
         template(with_dates, dates.step_of(period) if with_dates else 1),
@@ -134,12 +137,6 @@ def _band(forecast: Forecast | None) -> Iterator[dict[str, Any]]:
             yield {"t": stamp(moment), "v": value, "low": low, "high": high}
 
 
-def _beginning(forecast: Forecast | None) -> list[dict[str, Any]]:
-    if forecast is None or not forecast.moments:
-        return []
-    return [{"t": stamp(forecast.moments[0]), "text": forecast.label}]
-
-
 @cache
 def template(with_dates: bool, step: int) -> Spec:
     """The chart without its data, made once; `step` months lie between two ticks."""
@@ -182,9 +179,9 @@ def template(with_dates: bool, step: int) -> Spec:
         )
 
     def named(name: str, look: Spec, height: Any, **place: Any) -> Any:
-        return rows(name).transform_filter("datum.text").mark_text(**look, align="left", dx=4, aria=False, **place).encode(
-            x=x(), y=height, text="text:N"
-        )  # fmt: skip
+        written = rows(name).transform_filter("datum.text")
+        text = written.mark_text(**look, align="left", dx=4, aria=False, **place)
+        return text.encode(x=x(), y=height, text="text:N")
 
     limits, events, ahead = rows("limits"), rows("events"), rows("forecast")
     layers = [

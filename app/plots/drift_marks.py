@@ -68,10 +68,9 @@ class DriftChange:
 
 @dataclass(frozen=True, slots=True)
 class Forecast:
-    """The course to come with its prediction band; `label` names the line where it begins."""
+    """The course to come with its prediction band."""
 
     moments: Sequence[datetime]
     values: Sequence[float]
     low: Sequence[float]
     high: Sequence[float]
-    label: str = ""

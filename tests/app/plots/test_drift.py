@@ -44,9 +44,7 @@ BASELINES = [
     plots.ControlStretch(1.0, [(at(0), 0.9, 1.1)], REPAIR),
     plots.ControlStretch(1.5, [(REPAIR, 1.4, 1.6), (at(150), 1.35, 1.65)], PERIOD[1]),
 ]
-FORECAST = plots.Forecast(
-    [at(160), at(180), at(200)], [1.5, 1.5, 1.5], [1.4, 1.39, 1.38], [1.6, 1.61, 1.62], "today"
-)
+FORECAST = plots.Forecast([at(160), at(180), at(200)], [1.5, 1.5, 1.5], [1.4, 1.39, 1.38], [1.6, 1.61, 1.62])
 FULL = {
     "stretches": BASELINES, "forecast": FORECAST, "changes": [plots.DriftChange(at(90), at(110), "step +0.5")],
 }  # fmt: skip
@@ -83,7 +81,7 @@ def test_a_side_without_a_limit_has_no_line():
 
 
 def test_the_forecast_begins_today_and_ends_with_the_panel():
-    svg = drawn(chart(forecast=FORECAST))
+    svg = drawn(chart(forecast=FORECAST, today=plots.DriftEvent(at(165), "today")))
     assert ">today<" in svg
     rows = chart(forecast=FORECAST)["datasets"]["forecast"]
     assert [row["low"] for row in rows] == [1.4, 1.39, 1.38]
@@ -91,7 +89,7 @@ def test_the_forecast_begins_today_and_ends_with_the_panel():
 
 def test_a_forecast_of_wide_band_leaves_the_points_legible():
     """The points span 0.52; a band of ±100 widens the axis by half of that on each side."""
-    wide = plots.Forecast([at(160), at(200)], [1.5, 1.5], [1.0, -100.0], [2.0, 100.0], "today")
+    wide = plots.Forecast([at(160), at(200)], [1.5, 1.5], [1.0, -100.0], [2.0, 100.0])
     values = {item["name"]: item["value"] for item in chart(forecast=wide)["params"]}
     assert values["low"] > 0.99 - 0.26 - 0.1
     assert values["high"] < 1.51 + 0.26 + 0.1
