@@ -124,12 +124,12 @@ def demonstration_fleet(seed: int) -> tuple[FleetGyro, ...]:
     dph = rad_per_s_from_deg_per_h
     restless = replace(DTG_4, start_scatter={name: 4 * u for name, u in DTG_4.start_scatter.items()})
     repair = Jump(REPAIRED[1], {"w0x": dph(0.3), "wg": dph(-0.2), "wk": dph(0.15)})
-    jump = Jump(210 * DAY, {"wk": dph(0.5), "w0y": dph(-0.4)})
+    jump = Jump(210 * DAY, {"wk": dph(0.6), "w0y": dph(-0.4)})
     fleet = (
         FleetGyro("0412", *_born(GVK_6, seed, 0)),
         FleetGyro(
             "0417", *_born(GVK_6, seed, 1),
-            drift={"w0x": dph(0.6) / YEAR, "wg": dph(0.4) / YEAR, "wk": dph(0.085) / YEAR},
+            drift={"w0x": dph(0.6) / YEAR, "wg": dph(0.4) / YEAR, "wk": dph(0.17) / YEAR},
         ),
         FleetGyro(REPAIRED[0], *_born(GVK_6, seed, 2), jumps=(repair,)),
         FleetGyro("0423", *_born(GVK_6, seed, 3), jumps=(jump,)),
