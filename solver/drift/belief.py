@@ -5,12 +5,13 @@ that date, averaged over the sizes that are believed, over their likelihood with
 odds of each date and summed over dates it gives the odds of a change, and each date's part its probability.
 
 Moves come at a constant rate h, so the first one falls between the sessions at t₁ and t₂ with probability
-exp(−h·t₁) − exp(−h·t₂), and none comes until T with exp(−h·T). Without a change the expected evidence of every date is
-1, and so is, at any time, that of the sum weighted by these probabilities, with the sessions to come counted as no
-evidence either way. A sum that is never negative and whose expectation stays 1 exceeds x at any time of its life with a
-probability of 1/x at most (J. Ville, Étude critique de la notion de collectif, 1939, ch. V; G. Shafer et al.,
-Statist. Sci. 26 (2011) 84-101). Therefore, however often one looks, a stand that never changes is ever said to
-have changed with a probability ≥ p with a probability of (1 − p)·exp(h·T) at most: `false_alarm_bound`.
+exp(−h·t₁) − exp(−h·t₂). These stand against 1 for no move at all, which favours the stand that has not moved, the
+more the longer it has been watched. Where nothing moves the evidence of every date is expected to be 1, at any time;
+the sum over all dates, weighted so, with 1 for the dates to come, is never negative, begins with at most 1 and
+is expected to stay what it is. Such a sum exceeds x ever in its life with a probability of 1/x at most (J. Ville,
+Étude critique de la notion de collectif, 1939, ch. V; G. Shafer et al., Statist. Sci. 26 (2011) 84-101). So, however
+often one looks, a stand that never moves is ever said to have moved, with a probability ≥ p, with a probability of
+(1 − p)/p·(1 − exp(−h·T)) at most: `false_alarm_bound`.
 """
 
 from dataclasses import dataclass
@@ -59,8 +60,8 @@ class Belief:
         return float(special.logit(self.threshold))
 
     def false_alarm_bound(self, duration: float) -> float:
-        """Largest probability that one kind of change is ever found in a stand, over `duration`, s, without any."""
-        return float(min(1.0, (1.0 - self.threshold) * np.exp(self.moves * duration)))
+        """Largest probability that a stand is ever, in `duration`, s, said to have moved without having."""
+        return float((1.0 - self.threshold) / self.threshold * -np.expm1(-self.moves * duration))
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +92,7 @@ def log_date_odds(time: Array, rate: float) -> Array:
     """Logarithm of the prior odds that the first change falls before each of `time[1:]`, (n − 1,)."""
     since = rate * (time - time[0])
     with np.errstate(divide="ignore"):
-        return np.asarray(np.log(np.exp(-since[:-1]) - np.exp(-since[1:])) + since[-1])
+        return np.asarray(np.log(-np.expm1(-np.diff(since))) - since[:-1])
 
 
 def odds(log_evidence: Array, log_prior: Array) -> Odds:
