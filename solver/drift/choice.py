@@ -16,6 +16,8 @@ _STEPS: Final = 20
 _AGREEMENT: Final = 1e-10
 _FOR_A_SLOPE: Final = 3
 """Values that a slope needs beyond one for each level."""
+_FOR_AGEING: Final = 6
+"""Degrees of freedom of the constant from which ageing is thought of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +69,7 @@ class Chosen:
         """The model that the tests choose, and the paths that a forecast needs."""
         short, kept = series.without(structure.outliers)
         found, tau2 = _profiled(series, short, kept, structure)
-        aged = not structure.bends and found.dof > _FOR_A_SLOPE
+        aged = not structure.bends and found.dof >= _FOR_AGEING
         tests: tuple[TrendTest, ...] = (slope_test(found.squares, float(found.gain[-1]), found.dof),)
         tests += ageing_tests(found) if aged else ()
         model: Model = "linear" if tests[0].p_value <= level else "constant"
@@ -85,7 +87,7 @@ def _profiled(series: Series, short: Series, kept: Indices, structure: Structure
     flat, line = (design(series.x, structure, one)[kept] for one in (None, LINE))
     tau2 = fit(short, line).tau2
     found = profile(short, flat, tau2)
-    if structure.bends or found.best == LINE or found.dof <= _FOR_A_SLOPE:
+    if structure.bends or found.best == LINE or found.dof < _FOR_AGEING:
         return found, tau2
     aged = fit(short, linearised(series.x, structure, found.best)[kept]).tau2
     return (found, tau2) if aged >= tau2 else (profile(short, flat, aged), aged)

@@ -13,7 +13,7 @@ import numpy as np
 
 from solver.drift import trend
 from solver.drift.regression import LINE, Series, Structure, design, fit, shapes
-from solver.drift.steps import Ground
+from solver.drift.steps import BEFORE, CHANGES, Ground
 from solver.records import Array
 
 _WORTH_A_LOOK: Final = 0.1
@@ -54,18 +54,23 @@ def linearised(x: Array, structure: Structure, time_constant: float, amplitude: 
 
 
 def _criterion(ground: Ground, structure: Structure) -> float:
-    """Schwarz's criterion.
+    """Schwarz's criterion, and what is thought of bends before.
 
-    A wild value costs two parameters and counts as met. The slope of a line is kept out of caution, not found,
-    and costs none: so a constant with one step, its size and its date costs as much as ageing.
+    On a line without bends the slope is kept out of caution: a constant with the same steps is tried as well, so
+    that one step, its size and its date cost as much as ageing. A wild value costs two parameters and counts as met.
     """
+    tried = [ground.columns(structure)]
+    if ground.kinds == CHANGES and not structure.bends:
+        tried.append(design(ground.series.x, structure, None))
     kept, rows = ground.series.without(structure.outliers)
-    columns = ground.columns(structure)
-    done = fit(kept, columns[rows])
-    wild = done.scale * (ground.series.known[list(structure.outliers)] + done.tau2)
     dates = len(structure.steps + structure.bends) + 2 * len(structure.outliers)
-    count = columns.shape[1] + dates - (1 if "bends" in ground.kinds else 0)
-    return float(done.deviance(kept.known) + np.sum(np.log(wild)) + count * np.log(len(ground.series.x)))
+    found = []
+    for columns in tried:
+        done = fit(kept, columns[rows])
+        wild = done.scale * (ground.series.known[list(structure.outliers)] + done.tau2)
+        misfit = done.deviance(kept.known) + float(np.sum(np.log(wild)))
+        found.append(misfit + (columns.shape[1] + dates) * float(np.log(len(ground.series.x))))
+    return float(min(found) - 2.0 * BEFORE["bends"] * len(structure.bends))
 
 
 def _profile(series: Series, structure: Structure) -> trend.Profile:

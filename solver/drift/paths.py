@@ -19,12 +19,12 @@ from typing import Final
 
 import numpy as np
 
-from solver.drift.regression import LINE, Fit
+from solver.drift.regression import LINE, Fit, believed
 from solver.drift.trend import Profile
 from solver.records import Array
 
 _LINE_BEFORE: Final = 0.5
-_NEGLIGIBLE: Final = 1e-4
+_NEGLIGIBLE: Final = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +91,7 @@ def _path(found: Profile, place: np.intp, tau2: float, probability: float) -> Pa
     """One trend with its time constant held."""
     constant, dof = float(found.time_constant[place]), found.dof - 1
     factor, lean, u2 = found.factor[place], found.lean[place], found.length[place] ** -2.0
-    scale = (found.squares - found.gain[place]) / dof
+    scale = believed(float(found.squares - found.gain[place]), dof)
     covariance = np.array([[found.u_level**2 + lean**2 * u2, -lean * u2], [-lean * u2, u2]])
     return Path(
         probability=probability,
@@ -109,7 +109,7 @@ def _probabilities(found: Profile) -> Array:
     """P(T | values) of each T of the profile, but a factor."""
     angle = np.concatenate(([0.0], found.angle, [0.0]))
     before = 0.5 * (angle[1:] + angle[:-1])
-    before *= (1.0 - _LINE_BEFORE) / before.sum()
+    before *= (1.0 - _LINE_BEFORE) / (before.sum() or 1.0)
     before[-1] += _LINE_BEFORE
     before[np.isinf(found.length)] = 0.0
     left = np.maximum(found.squares - found.gain, 1e-12 * max(found.squares, np.finfo(np.float64).tiny))

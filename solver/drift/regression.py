@@ -12,7 +12,8 @@ Variance of a value: u² + τ² (`solver.drift.scatter`). Where the values agree
 are multiplied by their weighted mean square Q/(n − p) < 1, the square of Birge's ratio (R. T. Birge, Phys. Rev.
 40 (1932) 207-227): for equal u the variance is in both cases s², which follows χ² with n − p degrees of freedom,
 so that Student's factor holds exactly. A variance not allowed to fall below u² would make every interval too long
-on the average.
+on the average. Only an agreement that chance gives in one of a thousand histories is not believed: then something is
+wrong with the values, copied ones, say, and the factor stays where it has this probability.
 """
 
 from dataclasses import dataclass, replace
@@ -20,6 +21,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from solver.drift.scatter import paule_mandel
 from solver.records import Array
@@ -27,6 +29,7 @@ from solver.records import Array
 Indices = NDArray[np.intp]
 LINE: Final = float("inf")
 """The time constant of a straight line: that of an ageing without end."""
+_TOO_GOOD: Final = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +97,7 @@ class Fit:
     tau2 : float
         τ², 0 or more.
     scale : float
-        By which the variances u² + τ² are to be multiplied: 1 if τ² > 0, else 1 or less.
+        By which the variances u² + τ² are to be multiplied: 1 if τ² > 0, else 1 or less, Birge's factor squared.
     dof : int
         n − p; 0 leaves the variances as known.
     root, basis, rest : (n,), (n, p) and (n,) array
@@ -150,6 +153,11 @@ def design(x: Array, structure: Structure, time_constant: float | None) -> Array
     return np.stack(columns, axis=1)
 
 
+def believed(squares: float, dof: int) -> float:
+    """Mean square of `dof` degrees of freedom, not less than one of a thousand histories has by chance."""
+    return max(squares, float(special.chdtri(dof, 1.0 - _TOO_GOOD))) / dof
+
+
 def fit(series: Series, columns: Array, tau2: float | None = None) -> Fit:
     """Fit columns to a series, with τ² estimated unless it is given.
 
@@ -168,6 +176,6 @@ def fit(series: Series, columns: Array, tau2: float | None = None) -> Fit:
     basis, upper = np.linalg.qr(columns * root[:, None])
     seen = basis.T @ (series.y * root)
     rest = series.y * root - basis @ seen
-    scale = min(1.0, float(rest @ rest) / dof) if dof > 0 and tau2 is None else 1.0
+    scale = min(1.0, believed(float(rest @ rest), dof)) if dof > 0 and tau2 is None else 1.0
     inverse = np.linalg.inv(upper)
     return Fit(inverse @ seen, scale * inverse @ inverse.T, common, scale, dof, root, basis, rest, inverse)

@@ -22,9 +22,8 @@ CHANGES: Final[tuple[Kind, ...]] = ("steps", "bends")
 _MOST: Final = 30
 """Changes and wild values looked for."""
 _PASSES: Final = 3
-_BEFORE: Final[Mapping[Kind, float]] = {"steps": 0.0, "bends": -float(np.log(10.0)), "outliers": 0.0}
-"""Near an end a step and a bend look alike; a blow is the commoner cause, by ten to one."""
-_NOTHING: Final = 1e-12
+BEFORE: Final[Mapping[Kind, float]] = {"steps": 0.0, "bends": -float(np.log(10.0)), "outliers": 0.0}
+"""Logarithms of odds. Near an end a step and a bend look alike: a blow is the commoner cause, by ten to one."""
 _SPARE: Final = 3
 """Degrees of freedom that must be left after a change."""
 
@@ -148,8 +147,7 @@ def _best(sweeps: list[Sweep]) -> Candidate | None:
 
 def _credit(sweep: Sweep) -> float:
     """Logarithm of likelihood and of what is thought of the kind before, but a constant."""
-    left = max(sweep.squares - float(sweep.gain.max()), sweep.squares * _NOTHING)
-    return -0.5 * sweep.dof * float(np.log(left)) + _BEFORE[sweep.kind]
+    return sweep.likelihood + BEFORE[sweep.kind]
 
 
 def _all(structure: Structure) -> list[tuple[Kind, int]]:

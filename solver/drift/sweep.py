@@ -81,9 +81,17 @@ class Sweep:
 
         The likelihood with level, size and scatter at their best for each date: (RSS_k/RSS)^(−ν/2).
         """
-        left = np.maximum(self.squares - self.gain, _ROUNDING * max(self.dof - 1, 1))
-        exponent = -0.5 * self.dof * np.log(left / left.min())
-        return np.asarray(np.exp(exponent) / np.sum(np.exp(exponent)))
+        chance = np.exp(-0.5 * self.dof * np.log(self._left(self.gain)) - self.likelihood)
+        return np.asarray(chance / chance.sum())
+
+    @property
+    def likelihood(self) -> float:
+        """Logarithm of that of the best date, but a constant."""
+        return float(np.max(-0.5 * self.dof * np.log(self._left(self.gain))))
+
+    def _left(self, gain: Array) -> Array:
+        """Sum of squares with a change, not less than rounding makes."""
+        return np.asarray(np.maximum(self.squares - gain, _ROUNDING * max(self.dof - 1, 1)))
 
 
 def f_ratio(gain: float, squares: float, dof: int) -> float:

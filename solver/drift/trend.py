@@ -37,7 +37,8 @@ _LONGEST: Final = 3.0
 """Time constant, of the history's length, beyond which ageing is a line."""
 _SHORTEST: Final = 0.02
 _GRID: Final = 24
-_VISIBLE: Final = 1e-9
+_VISIBLE: Final = 1e-20
+"""Of a column's square: less of it beside the other columns is rounding."""
 _AGREEMENT: Final = 1e-3
 """Of ln T; what is left of it goes in the last steps of the fit."""
 
