@@ -1,8 +1,8 @@
 """Control charts of values that each have an uncertainty of their own, against a frozen baseline.
 
 Every chart takes the values to be judged and a `solver.drift.baseline.Baseline`, and the kind of limits (see there).
-Points not to be judged, those of the baseline itself say, get their limits and z, but raise nothing and are in no run or
-average. A repair ends a baseline: values after it are judged by the next one, in another call.
+Points not to be judged, those of the baseline itself say, get their limits and z, but raise nothing and are in no
+run or average. A repair ends a baseline: values after it are judged by the next one, in another call.
 
 Individuals and moving range
     NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2.

@@ -149,7 +149,8 @@ def _cases(count: int, dof: float, limits: Limits, moving_range: bool) -> _Cases
     )
     root = low + (high - low) / 2.0 * (nodes + 1.0)
     ratio = np.square(root)
-    of_ratio = weights * root * np.exp((dof - 1.0) * np.log(ratio) - half * np.square(ratio))
+    # The density over its value at 1, where it is of the size of its maximum.
+    of_ratio = weights * root / ratio * np.exp(half * (2.0 * np.log(ratio) - np.square(ratio) + 1.0))
     weight = np.outer(of_delta / of_delta.sum(), of_ratio / of_ratio.sum()).ravel()
     unbias = c4(dof) if moving_range and limits == "three-sigma" else 1.0
     delta = np.repeat(standard / np.sqrt(count), _RATIOS)

@@ -53,12 +53,13 @@ class Prediction:
             2.0 * float(inverse(half, _CUT)) for inverse in (special.gammaincinv, special.gammainccinv)
         )
         end = min(most, dof * typical / known) if known > 0.0 else most
-        least = min(least, end * 0.5)
+        least = least if least < end else end / 2.0
         nodes, weights = np.polynomial.legendre.leggauss(_NODES)
         span = (np.log(end) - np.log(least)) / 2.0
-        log = np.log(least) + span * (nodes + 1.0)
-        density = np.exp(half * (log - np.log(2.0)) - np.exp(log) / 2.0 - special.gammaln(half))
-        variance = np.append(np.maximum(dof * typical / np.exp(log) - known, 0.0), 0.0)
+        # ln(χ²/ν), near 0 where there are many degrees of freedom; the density relative to that at 0 loses no digits.
+        log = np.log(least / dof) + span * (nodes + 1.0)
+        density = np.exp(half * (log - np.expm1(log)) + half * (np.log(half) - 1.0) - special.gammaln(half))
+        variance = np.append(np.maximum(typical * np.exp(-log) - known, 0.0), 0.0)
         weight = np.append(span * weights * density, special.gammaincc(half, end / 2.0))
         used = weight > 0.0 if end < most else np.arange(_NODES + 1) < _NODES
         return cls(variance[used], weight[used] / weight[used].sum())

@@ -142,7 +142,9 @@ def known(name: str) -> Rule:
     return RULES[name]
 
 
-def episodes(met: Mask, start: ArrayLike, rule: str, side: int) -> list[Violation]:
+def episodes(
+    met: Mask, start: ArrayLike, rule: str, side: int, change: Mask | None = None
+) -> list[Violation]:
     """Violations from the points that complete a pattern: patterns that overlap or touch are one.
 
     Parameters
@@ -153,12 +155,15 @@ def episodes(met: Mask, start: ArrayLike, rule: str, side: int) -> list[Violatio
         Where the pattern that is complete there begins.
     rule, side
         As in `Violation`.
+    change : (n,) bool array, optional
+        Points that do not belong to the stretch of the one before: what touches there is not joined.
     """
     ends = np.flatnonzero(met)
     if not len(ends):
         return []
     begins = np.asarray(start, np.int64)[ends]
-    new = np.append(True, begins[1:] > ends[:-1] + 1)
+    apart = begins[1:] - ends[:-1]
+    new = np.append(True, (apart > 1) | ((apart == 1) & (False if change is None else change[begins[1:]])))
     heads = np.flatnonzero(new)
     tails = np.append(heads[1:], len(ends)) - 1
     return [
@@ -178,7 +183,7 @@ def _of_rule(z: Array, rule: Rule, name: str, change: Mask) -> list[Violation]:
         total = np.append(0, np.cumsum(mark))
         met = mark & (total[index + 1] - total[low] >= rule.needed - fewer)
         nearest = np.minimum.accumulate(np.where(mark, index, len(z))[::-1])[::-1]
-        found += episodes(met, nearest[low] - fewer, name, side)
+        found += episodes(met, nearest[low] - fewer, name, side, change)
     return found
 
 
