@@ -72,9 +72,10 @@ class Chosen:
         aged = not structure.bends and found.dof >= _FOR_AGEING
         tests: tuple[TrendTest, ...] = (slope_test(found.squares, float(found.gain[-1]), found.dof),)
         tests += ageing_tests(found) if aged else ()
-        model: Model = "linear" if tests[0].p_value <= level else "constant"
+        share = level / 2.0 if aged else level  # two ways to name a trend where there is none
+        model: Model = "linear" if tests[0].p_value <= share else "constant"
         constant = LINE if model == "linear" else None
-        if aged and found.best != LINE and max(one.p_value for one in tests[1:]) <= level:
+        if aged and found.best != LINE and max(one.p_value for one in tests[1:]) <= share:
             model, constant = "exponential", found.best
         constant, columns = _columns(series, short, kept, structure, constant)
         done = fit(short, columns[kept])

@@ -13,9 +13,11 @@ import numpy as np
 
 from solver.drift import trend
 from solver.drift.regression import LINE, Series, Structure, design, fit, shapes
-from solver.drift.steps import BEFORE, CHANGES, Ground
+from solver.drift.steps import CHANGES, Ground
 from solver.records import Array
 
+_DOUBT: Final = 2.0 * float(np.log(100.0))
+"""Of each bend: that ageing is gradual is thought a hundred times likelier before."""
 _WORTH_A_LOOK: Final = 0.1
 """p of ageing against a line from which a ground of ageing is tried."""
 
@@ -70,7 +72,7 @@ def _criterion(ground: Ground, structure: Structure) -> float:
         wild = done.scale * (ground.series.known[list(structure.outliers)] + done.tau2)
         misfit = done.deviance(kept.known) + float(np.sum(np.log(wild)))
         found.append(misfit + (columns.shape[1] + dates) * float(np.log(len(ground.series.x))))
-    return float(min(found) - 2.0 * BEFORE["bends"] * len(structure.bends))
+    return float(min(found)) + _DOUBT * len(structure.bends)
 
 
 def _profile(series: Series, structure: Structure) -> trend.Profile:

@@ -9,7 +9,7 @@ curvature that the tests do not show moves a forecast by more than a constant's 
 
         P(T | values) ∝ P(T)·χ²(T)^(−ν/2),
 
-    the likelihood with level, steps and scatter at their best. P(T), before the values, is a half for the line; the
+    the likelihood with level, steps and scatter at their best. P(T), before the values, is a tenth for the line; the
     rest is shared by the angle by which exp(−t/T), as these values see it, turns from one T to the next, which is
     Jeffreys' rule here.
 """
@@ -23,7 +23,8 @@ from solver.drift.regression import LINE, Fit, believed
 from solver.drift.trend import Profile
 from solver.records import Array
 
-_LINE_BEFORE: Final = 0.5
+_LINE_BEFORE: Final = 0.1
+"""Simulated: with more, slow ageing leaves the band too often; with less, it is too wide under a line."""
 _NEGLIGIBLE: Final = 1e-3
 
 

@@ -19,7 +19,8 @@ exponential against linear
     F = Δχ²/(χ²/ν), 1 and ν degrees of freedom. T is on one side of T = ∞ only, so that where there is a slope p is up
     to twice too large, never too small.
 
-The exponential is chosen if both its tests are significant, else the line if its test is.
+The exponential is chosen if both its tests are significant, else the line if its test is, each at half the level
+asked for: a trend of either kind is then named by chance at that level.
 """
 
 from dataclasses import dataclass
