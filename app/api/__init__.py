@@ -12,10 +12,16 @@ from typing import Final
 from fastapi import FastAPI
 
 from app.api import (
+    alarms,
+    baselines,
     calibrations,
     certificates,
+    compare,
     docs,
+    drift,
     due,
+    events,
+    fleet,
     gyros,
     history,
     jobs,
@@ -26,6 +32,7 @@ from app.api import (
     problems,
     sessions,
     simulations,
+    stand_drift,
     stands,
     station,
     types,
@@ -43,8 +50,9 @@ _DESCRIPTION: Final = (
     "results. Every number is in the unit that its field's name ends with."
 )
 _NOUNS: Final = (
-    gyros, history, types, loop, stands, planning, certificates, uploads, sessions, positions, calibrations,
-    due, simulations, station, jobs, validation, docs,
+    gyros, history, drift, events, baselines, alarms, types, fleet, compare, loop, stands, stand_drift,
+    planning, certificates, uploads, sessions, positions, calibrations, due, simulations, station, jobs,
+    validation, docs,
 )  # fmt: skip
 
 

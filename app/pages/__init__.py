@@ -40,6 +40,7 @@ from app.pages import (
     sessions,
     sign_in,
     simulations,
+    stand_drift,
     stands,
     today,
     types,
@@ -52,10 +53,9 @@ __all__ = ["errors", "mount", "router"]
 
 router = APIRouter(include_in_schema=False)
 for _noun in (
-    today, sessions, session_files, entry, live, results, measurements, gyros, history, drift, baselines, events,
-    alarms, types,
-    fleet, compare, stands, planning, uncertainty, certificates, simulations, jobs, method, loop, validation,
-    sign_in, choices, assets,
+    today, sessions, session_files, entry, live, results, measurements, gyros, history, drift, baselines,
+    events, alarms, types, fleet, compare, stands, stand_drift, planning, uncertainty, certificates,
+    simulations, jobs, method, loop, validation, sign_in, choices, assets,
 ):  # fmt: skip
     router.include_router(_noun.router)
 

@@ -1,15 +1,10 @@
 """A stand's study against a truth that was drawn: who changed, when, by how much."""
 
 import json
-import sys
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))  # test modules are no package
-
 from stand_tables import BEGIN, sessions, stored, turned
 
 from app.services.access import SYSTEM

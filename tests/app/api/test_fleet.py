@@ -1,0 +1,75 @@
+"""Fleets, comparisons and stands, asked by a program."""
+
+import io
+from datetime import UTC, datetime
+
+import httpx
+import pyarrow.parquet as pq
+import pytest
+from serving import Service
+from stand_tables import sessions, stored, turned
+
+from app.services import access
+from app.services.drift import studying
+from app.services.lab import Lab
+
+PARQUET = {"accept": "application/vnd.apache.parquet"}
+CSV = {"accept": "text/csv"}
+
+
+@pytest.fixture
+def lab(service: Service, stand: httpx.Client) -> Lab:
+    """Four gyros for half a year on stand S1, whose base turned by 200″."""
+    with service.lab.write(access.SYSTEM) as work:
+        table = turned(sessions(["0412", "0417", "0419", "0423"], 6, 4), 12, azimuth=200.0)
+        stored(work, table, "S1")
+        studying.follow_all_now(work)
+    return service.lab
+
+
+def _columns(answer: httpx.Response) -> list[str]:
+    return list(pq.read_table(io.BytesIO(answer.content)).column_names)
+
+
+def test_all_of_it_in_every_form(client: httpx.Client, lab: Lab) -> None:
+    fleet = client.get("/types/GVK-6/fleet").json()
+    assert [item["due"]["gyro"] for item in fleet["gyros"]] == ["0412", "0417", "0419", "0423"]
+    assert fleet["gyros"][0]["parameters"]["w0x"]["value"]["value"] == pytest.approx(
+        1.2, abs=0.2
+    )  # 10 scatters
+    assert len(fleet["correlations"]) == 28
+    assert _columns(client.get("/types/GVK-6/fleet", headers=PARQUET))[0] == "gyro"
+    assert client.get("/types/GVK-6/fleet", headers=CSV).text.startswith("gyro,type,check")
+    assert client.get("/types/none/fleet").status_code == 404
+
+    drift = client.get("/stands/S1/drift").json()
+    assert [item["direction"] for item in drift["document"]["findings"]] == ["azimuth"]
+    assert (len(drift["points"]), drift["by"], drift["up_to_date"]) == (24, "session", True)
+    assert drift["alarms"][0]["kind"] == "stand-azimuth"
+    assert 8 <= len(drift["affected"]) <= 16  # twelve sessions came after the turn
+    assert len(client.get("/stands/S1/drift?by=month").json()["points"]) == 6
+    assert client.get("/stands/S1/drift?by=moon").status_code == 422
+    assert client.get("/stands/S9/drift").status_code == 404
+    assert len(client.get("/stands/S1/drift", headers=CSV).text.splitlines()) == 25
+    assert "azimuth_arcsec" in _columns(client.get("/stands/S1/drift", headers=PARQUET))
+
+    found = client.get("/compare?a=session:1&b=gyro:0417").json()
+    assert [item["parameter"] for item in found["parameters"]][:2] == ["kx", "ky"]
+    assert found["verdict"] in ("agree", "differ")
+    assert found["chi2"] is None  # these results hold no covariance
+    assert _columns(client.get("/compare?a=session:1&b=session:2", headers=PARQUET))[0] == "parameter"
+    assert client.get("/compare?a=session:1&b=session:1").status_code == 422
+    assert client.get("/compare?a=session:1").status_code == 422
+    assert client.get("/compare?a=session:1&b=session:999").status_code == 404
+
+
+def test_differences_are_in_units_of_their_uncertainty(client: httpx.Client, lab: Lab) -> None:
+    found = client.get("/compare?a=session:1&b=session:2").json()
+    item = next(item for item in found["parameters"] if item["parameter"] == "w0x")
+    difference = item["a"]["value"] - item["b"]["value"]
+    # u = 0.002 °/h of each, independent, no degrees of freedom stated: U = 1.96·√2·0.002 °/h; k = 2 in E_n
+    assert item["difference"] == pytest.approx(difference)
+    assert item["expanded_uncertainty"] == pytest.approx(1.959964 * 2**0.5 * 0.002, rel=1e-6)
+    assert item["e_n"] == pytest.approx(difference / (2 * 2**0.5 * 0.002))
+    assert item["verdict"] == ("differ" if abs(item["in_expanded"]) > 1 else "agree")
+    assert datetime.fromisoformat(found["a"]["measured_at"]) < datetime(2025, 1, 1, tzinfo=UTC)
