@@ -1,7 +1,7 @@
 """A gyro's history: control charts, alarms and events, repeatability, trend, and every value."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime, time, timedelta
 from typing import Annotated, Any, Final, Literal
 
@@ -18,7 +18,6 @@ from app.services import gyros, sessions
 from app.services.drift import alarms, due, events, grouping, reading
 from app.services.drift.alarms import CAUSES
 from app.services.drift.views import DriftPoint, EventView, GyroDrift, ParameterDrift
-from app.services.lab import Work
 
 router = APIRouter()
 
@@ -58,10 +57,13 @@ def page(request: Request, person: Reader, lab: TheLab, serial: str, wanted: Wan
         repaired = last_repair(events.of_gyro(work, serial))
         since, until = bounds(wanted, repaired, now)
         found = reading.gyro_drift(
-            work, serial, method=wanted.method, parameters=ORDER, since=since, until=until, by=wanted.by
-        )
+            work, serial, method=wanted.method, parameters=ORDER, since=since, until=until, by=wanted.by,
+            newest=_MOST_ROWS,
+        )  # fmt: skip
         known = alarms.alarms(work, gyro=serial, method=wanted.method, state=None)
-        rows = _newest(work, serial, wanted, found, since, until)
+        rows = drift_tables.by_session(
+            [replace(item, points=item.newest) for item in found.parameters], _MOST_ROWS
+        )
         latest = sessions.sessions(work, gyro=serial, limit=_SESSIONS)
         holds = due.due_of(work, [serial]).get(serial)
     window = drift_panels.window_of(found, since, until, now)
@@ -150,21 +152,6 @@ def _midnight(day: date | None) -> datetime | None:
 
 def _results(parameters: tuple[ParameterDrift, ...]) -> int:
     return max((item.sessions for item in parameters), default=0)
-
-
-def _newest(
-    work: Work, serial: str, wanted: View, found: GyroDrift, since: datetime | None, until: datetime | None
-) -> list[tuple[DriftPoint, dict[str, DriftPoint]]]:
-    """The table behind the charts; where the charts show fewer points than sessions, read for itself."""
-    if wanted.by != "session" or any(item.reduced for item in found.parameters):
-        newest = sessions.sessions(work, gyro=serial, until=until, limit=_MOST_ROWS).items
-        since = max(
-            (item for item in (since, *(one.started_at for one in newest[-1:])) if item), default=None
-        )
-        found = reading.gyro_drift(
-            work, serial, method=wanted.method, parameters=ORDER, since=since, until=until, most=None
-        )
-    return drift_tables.by_session(found.parameters, _MOST_ROWS)
 
 
 COLUMNS: Final = (

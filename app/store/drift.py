@@ -5,7 +5,7 @@ from datetime import datetime
 from typing import NamedTuple
 
 import sqlalchemy as sa
-from sqlalchemy.orm import Session, aliased, undefer
+from sqlalchemy.orm import Session, aliased, selectinload, undefer
 
 from app.store.tables import (
     Alarm,
@@ -262,6 +262,7 @@ def alarm_rows(
         .join(first, first.id == shown.session_id)
         .join(kept, kept.id == Alarm.last_calibration_id)
         .join(last, last.id == kept.session_id)
+        .options(selectinload(Alarm.gyro), selectinload(Alarm.stand))
         .order_by(rank, Alarm.raised_at.desc(), Alarm.id.desc())
         .offset(start)
         .limit(limit)

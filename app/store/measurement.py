@@ -6,7 +6,7 @@ from datetime import datetime
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from app.store.tables import Calibration, Gyro, Measurement, MeasuringSession, Record, Stand
+from app.store.tables import Gyro, Measurement, MeasuringSession, Record, Stand
 
 
 def session(db: Session, session_id: int) -> MeasuringSession | None:
@@ -41,9 +41,11 @@ def sessions(
 
 def unsolved(db: Session, limit: int) -> Sequence[MeasuringSession]:
     """Sessions without any result, the newest first."""
-    solved = sa.exists().where(Calibration.session_id == MeasuringSession.id)
     return db.scalars(
-        sa.select(MeasuringSession).where(~solved).order_by(MeasuringSession.id.desc()).limit(limit)
+        sa.select(MeasuringSession)
+        .where(sa.text("NOT session.solved"))
+        .order_by(MeasuringSession.id.desc())
+        .limit(limit)
     ).all()
 
 

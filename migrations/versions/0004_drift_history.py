@@ -24,6 +24,7 @@ _SESSIONS_OF = ("gyro_id", "stand_id")
 def upgrade() -> None:
     for table, column in _ADDED:
         op.add_column(table, column)
+    _unsolved()
     for column in _SESSIONS_OF:
         op.drop_index(op.f(f"ix_session_{column}"), "session")
         op.create_index(op.f(f"ix_session_{column}_started_at"), "session", [column, "started_at"])
@@ -32,6 +33,13 @@ def upgrade() -> None:
     _baseline()
     _alarm()
     _study()
+
+
+def _unsolved() -> None:
+    op.add_column("session", sa.Column("solved", sa.Boolean(), nullable=False, server_default=sa.false()))
+    op.execute("UPDATE session SET solved = true WHERE id IN (SELECT session_id FROM calibration)")
+    where = sa.text("NOT solved")
+    op.create_index("ix_session_unsolved", "session", ["id"], sqlite_where=where, postgresql_where=where)
 
 
 def _attitude() -> None:
@@ -172,6 +180,8 @@ def _indexed(table: str) -> None:
 def downgrade() -> None:
     for table in ("drift_study", "alarm", "baseline", "event", "stand_attitude"):
         op.drop_table(table)
+    op.drop_index("ix_session_unsolved", "session")
+    op.drop_column("session", "solved")
     for column in reversed(_SESSIONS_OF):
         op.drop_index(op.f(f"ix_session_{column}_started_at"), "session")
         op.create_index(op.f(f"ix_session_{column}"), "session", [column])

@@ -86,20 +86,32 @@ def _external(value: Array, weight: Array, mean: float) -> float:
 
 
 def reduced(table: SeriesTable, parameter: str, most: int) -> NDArray[np.int64]:
-    """Rows that show a parameter in at most `most` points: of equal spans of time the lowest and the highest.
-
-    The first and the last row stay; every extreme of the whole is among them.
-    """
+    """Rows that show a parameter in at most `most` points, four at the least; see `extremes`."""
     places = table.determined(parameter)
-    if len(places) <= most:
-        return places
     times = table["measured_at"][places].astype(np.int64)
+    kept: NDArray[np.int64] = places[extremes(times, table[f"{parameter}.value"][places], most)]
+    return kept
+
+
+def extremes(times: Column, values: Array, most: int) -> NDArray[np.int64]:
+    """Places that show values in at most `most` points: of equal spans of time the lowest and the highest.
+
+    The first and the last one stay; every extreme of the whole is among them.
+
+    Parameters
+    ----------
+    times : (n,) int array
+        Rising.
+    values : (n,) array
+        Finite.
+    """
+    if len(times) <= most:
+        return np.arange(len(times))
     bins = max(1, (most - 2) // 2)
     span = float(times[-1] - times[0]) or inf
     which = np.minimum(((times - times[0]) / span * bins).astype(np.int64), bins - 1)
-    value = np.asarray(table[f"{parameter}.value"][places], np.float64)
-    kept = {0, len(places) - 1}
-    for extreme in (value, -value):
+    kept = {0, len(times) - 1}
+    for extreme in (values, -values):
         order = np.lexsort((extreme, which))
         kept |= set(order[np.flatnonzero(np.diff(which[order], prepend=-1))].tolist())
-    return places[np.array(sorted(kept), np.int64)]
+    return np.array(sorted(kept), np.int64)

@@ -2,7 +2,8 @@
 
 import json
 from collections.abc import Iterator, Sequence
-from datetime import datetime
+from datetime import UTC, datetime
+from itertools import repeat
 from typing import Any, Final
 
 import numpy as np
@@ -11,6 +12,7 @@ from app.errors import Invalid, problem
 from app.exchange.json_values import Json
 from app.exchange.si import PARAMETER_UNITS
 from app.services.drift import alarms, baselines, events, grouping, series
+from app.services.drift.charting import CHARTS
 from app.services.drift.series import SeriesTable, aware
 from app.services.drift.views import (
     DriftPoint,
@@ -29,8 +31,9 @@ from app.store.tables import DriftStudy, Gyro
 from solver.records import PARAMETERS
 
 METHODS: Final = ("least-squares", "generalised", "robust", "paper")
-MOST_POINTS: Final = 200
-"""Of one chart: as many as a page's width shows apart."""
+MOST_POINTS: Final = 120
+"""Of one chart: as many as its width shows apart."""
+_HEADS: Final = ("calibration", "session", "start", "stand", "certificate", "revisions")
 
 
 def gyro_drift(
@@ -43,6 +46,7 @@ def gyro_drift(
     until: datetime | None = None,
     by: str = "session",
     most: int | None = MOST_POINTS,
+    newest: int = 0,
 ) -> GyroDrift:
     """A gyro's drift by one method: what was found, and the points of a period.
 
@@ -56,6 +60,8 @@ def gyro_drift(
         What a point stands for: session, start, day, month or year.
     most
         Points of each parameter at the most; None for all.
+    newest
+        Of how many of the newest sessions every value is wanted as well.
 
     Raises
     ------
@@ -86,7 +92,7 @@ def gyro_drift(
         since=None if not made or table is None or not len(table) else aware(table["measured_at"][0]),
         until=None if not made or table is None or not len(table) else aware(table["measured_at"][-1]),
         document=document,
-        parameters=tuple(_parameter(gyro, name, shown, document, by, most) for name in parameters),
+        parameters=tuple(_parameter(gyro, name, shown, document, by, most, newest) for name in parameters),
         events=tuple(sorted(found, key=lambda item: item.at)),
         baselines=baselines.of_gyro(work, serial, method=method),
         alarms=alarms.alarms(work, gyro=serial, method=method),
@@ -169,46 +175,64 @@ def _parameter(
     document: dict[str, Any] | None,
     by: str,
     most: int | None,
+    newest: int,
 ) -> ParameterDrift:
     limits = next((item for item in gyro.type.limits if item.parameter == name), None)
     low, high = (limits.low, limits.high) if limits else (None, None)
     places = np.array([], np.int64) if table is None else table.determined(name)
     points: list[DriftPoint] = []
+    whole = len(places)
     if table is not None and by == "session":
         kept = places if most is None else grouping.reduced(table, name, most)
         points = list(_points(table.rows(kept), name, low, high))
     elif table is not None:
         points = list(_groups(table, name, by, low, high))
-        points = points if most is None else points[-most:]
+        whole = len(points)
+        points = points if most is None else _fewer(points, most)
     return ParameterDrift(
         parameter=name, unit=PARAMETER_UNITS[name][0], low=low, high=high,
         repeatability=limits.repeatability if limits else None, sessions=len(places),
-        reduced=by == "session" and len(points) < len(places), points=tuple(points),
+        reduced=len(points) < whole, points=tuple(points),
+        newest=() if table is None else tuple(_newest(table, name, low, high, newest)),
         study=None if document is None else document["parameters"].get(name),
     )  # fmt: skip
 
 
+def _fewer(points: list[DriftPoint], most: int) -> list[DriftPoint]:
+    times = np.array([round(point.at.timestamp()) for point in points], np.int64)
+    values = np.array([point.value for point in points], np.float64)
+    return [points[place] for place in grouping.extremes(times, values, most)]
+
+
+def _newest(
+    table: SeriesTable, name: str, low: float | None, high: float | None, count: int
+) -> Iterator[DriftPoint]:
+    last = table.rows(slice(max(0, len(table) - count), None))
+    return _points(last.rows(last.determined(name)), name, low, high)
+
+
 def _points(table: SeriesTable, name: str, low: float | None, high: float | None) -> Iterator[DriftPoint]:
-    charts = {
-        column.removeprefix(f"{name}."): table[column].tolist()
-        for column in table.columns
-        if column.startswith(f"{name}.") and column.removeprefix(f"{name}.") not in (*series.PARTS, "signals")
-    }
-    signals = table.columns.get(f"{name}.signals")
-    columns = {part: table[f"{name}.{part}"].tolist() for part in series.PARTS}
-    heads = {
-        part: table[part].tolist()
-        for part in ("calibration", "session", "start", "stand", "certificate", "revisions")
-    }
-    for place in range(len(table)):
-        value, k = columns["value"][place], columns["k"][place]
-        u = _known(columns["u"][place])
-        at = aware(table["measured_at"][place])
+    drawn = [chart for chart in CHARTS if f"{name}.{chart}" in table]
+    charts = zip(*(series.known(table[f"{name}.{chart}"]) for chart in drawn), strict=True)
+    signals = (
+        table[f"{name}.signals"] if f"{name}.signals" in table.columns else np.full(len(table), "", object)
+    )
+    heads = zip(*(table[part].tolist() for part in _HEADS), strict=True)
+    values = zip(
+        table[f"{name}.value"].tolist(),
+        series.known(table[f"{name}.u"]),
+        table[f"{name}.k"].tolist(),
+        strict=True,
+    )
+    times = (at.replace(tzinfo=UTC) for at in table["measured_at"].tolist())
+    said = charts if drawn else repeat((), len(table))
+    for head, at, (value, u, k), chart, rules in zip(heads, times, values, said, signals, strict=True):
+        calibration, session, start, stand, certificate, revisions = head
         yield DriftPoint(
-            **{part: column[place] for part, column in heads.items()}, at=at, until=at, sessions=1,
-            value=value, u=u, k=k, scatter=None, verdict=judge(value, u, low, high, k),
-            charts={chart: _known(column[place]) for chart, column in charts.items()},
-            signals=tuple(signals[place].split()) if signals is not None else (),
+            calibration=calibration, session=session, at=at, until=at, sessions=1, start=start, stand=stand,
+            certificate=certificate, revisions=revisions, value=value, u=u, k=k, scatter=None,
+            verdict=judge(value, u, low, high, k), charts=dict(zip(drawn, chart, strict=True)),
+            signals=tuple(rules.split()),
         )  # fmt: skip
 
 
@@ -224,7 +248,3 @@ def _groups(
             value=group.value, u=group.u, k=group.k, scatter=group.scatter,
             verdict=judge(group.value, group.u, low, high, group.k), charts={}, signals=(),
         )  # fmt: skip
-
-
-def _known(number: float) -> float | None:
-    return None if number != number else number

@@ -186,6 +186,8 @@ class ParameterDrift:
         Limits of the type: for the value, and for its standard deviation from session to session.
     sessions
         How many sessions of the period determined it; `points` may be fewer, `reduced` says so.
+    newest
+        Of the newest sessions of the period one point each, as many as were asked for, whatever `points` are.
     study
         What was found of it over its whole life (the document's entry); None before the first study.
     """
@@ -198,6 +200,7 @@ class ParameterDrift:
     sessions: int
     reduced: bool
     points: tuple[DriftPoint, ...]
+    newest: tuple[DriftPoint, ...]
     study: Mapping[str, Any] | None
 
 

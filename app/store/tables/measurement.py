@@ -14,11 +14,21 @@ class MeasuringSession(Base):
     """One gyro, one stand, one start, one version of the stand's certificate.
 
     `latitude_deg` is the stand's at the time: a stand that moves later does not change the past.
-    `truth` holds a simulated gyro's true parameters in laboratory units; None for a real one.
+    `truth` holds a simulated gyro's true parameters in laboratory units; None for a real one. `solved` says
+    whether it has a result: the few that have none are found without walking through all.
     """
 
     __tablename__ = "session"
-    __table_args__ = (sa.Index(None, "gyro_id", "started_at"), sa.Index(None, "stand_id", "started_at"))
+    __table_args__ = (
+        sa.Index(None, "gyro_id", "started_at"),
+        sa.Index(None, "stand_id", "started_at"),
+        sa.Index(
+            "ix_session_unsolved",
+            "id",
+            sqlite_where=sa.text("NOT solved"),
+            postgresql_where=sa.text("NOT solved"),
+        ),
+    )
 
     id: Mapped[int] = mapped_column(primary_key=True)
     gyro_id: Mapped[int] = mapped_column(sa.ForeignKey("gyro.id"))
@@ -33,6 +43,7 @@ class MeasuringSession(Base):
     created_at: Mapped[datetime]
     created_by: Mapped[str]
     truth: Mapped[dict[str, Any] | None]
+    solved: Mapped[bool] = mapped_column(default=False, server_default=sa.false())
 
     gyro: Mapped[Gyro] = relationship(lazy="joined", innerjoin=True)
     stand: Mapped[Stand] = relationship(lazy="joined", innerjoin=True)

@@ -4,7 +4,8 @@ from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy.orm import Mapped, mapped_column, relationship
+from sqlalchemy import event
+from sqlalchemy.orm import Mapped, Mapper, mapped_column, relationship
 
 from app.store.tables.base import Base
 from app.store.tables.measurement import MeasuringSession
@@ -64,6 +65,14 @@ class Calibration(Base):
     session: Mapped[MeasuringSession] = relationship(lazy="joined", innerjoin=True)
     parameters: Mapped[list["CalibrationParameter"]] = relationship(
         lazy="selectin", order_by="CalibrationParameter.id"
+    )
+
+
+@event.listens_for(Calibration, "after_insert")
+def _solve(_mapper: Mapper[Calibration], connection: sa.Connection, row: Calibration) -> None:
+    """Its session has a result from now on."""
+    connection.execute(
+        sa.update(MeasuringSession).where(MeasuringSession.id == row.session_id).values(solved=True)
     )
 
 
