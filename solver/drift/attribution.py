@@ -207,7 +207,7 @@ def _turned_east(starts: Starts, places: Whole, told: Odds, seen: Shared, at: in
     """Tell of a turn about east; where it hangs on one gyro, only the prior rates tell the stand from that gyro."""
     size = float(told.dates @ seen.value[:, 0])
     u = float(np.sqrt(told.dates @ (seen.covariance[:, 0, 0] + (seen.value[:, 0] - size) ** 2)))
-    clear = float(seen.log_evidence[at] - seen.alone[at]) > _OTHERS
+    clear = float(seen.without[at]) > _OTHERS
     p = told.probability
     stand = p * (1.0 if clear else belief.moves / (belief.moves + belief.gyro_changes))
     return Finding(

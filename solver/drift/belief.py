@@ -105,6 +105,15 @@ def odds(log_evidence: Array, log_prior: Array) -> Odds:
     return Odds(total, share.sum(axis=0), share.sum(axis=1))
 
 
+def tempered(gain: Array, dof: float) -> Array:
+    """What half a χ² is worth, (...), when it was formed with a variance of `dof` degrees of freedom.
+
+    The logarithm of a ratio of Student's densities, ν/2·log(1 + χ²/ν): a scatter known from few starts may be
+    several times as large, and then large differences are nothing unusual.
+    """
+    return np.asarray(dof / 2.0 * np.log1p(2.0 * np.maximum(gain, 0.0) / dof) + np.minimum(gain, 0.0))
+
+
 def gaussian_evidence(information: Array, score: Array, size: float) -> Array:
     """Logarithm of the evidence of a shift d ~ N(0, size²·1), whose likelihood ratio is exp(d·score − d·I·d/2).
 

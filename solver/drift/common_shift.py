@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from solver.drift.belief import Belief
+from solver.drift.belief import Belief, tempered
 from solver.drift.starts import Starts
 from solver.records import Array
 
@@ -49,12 +49,15 @@ class Splits:
         Logarithm of C_g.
     gyros : (G,) int array
         Labels.
+    dof : float
+        Of the scatter.
     """
 
     information: Array
     score: Array
     own: Array
     gyros: Whole
+    dof: float
 
 
 def split(starts: Starts, dates: Whole, belief: Belief) -> Splits:
@@ -73,18 +76,24 @@ def split(starts: Starts, dates: Whole, belief: Belief) -> Splits:
         difference = share @ sums
         information[row] = ((difference + difference.swapaxes(-1, -2)) / 2)[after]
         score[row] = (pulls[-1] - pulls - np.einsum("mij,j->mi", share, pulls[-1]))[after]
-    return Splits(information, score, own_change(information, score, belief.gyro_change_size), gyros)
+    return Splits(
+        information,
+        score,
+        own_change(information, score, belief.gyro_change_size, starts.dof),
+        gyros,
+        starts.dof,
+    )
 
 
-def own_change(information: Array, score: Array, size: float) -> Array:
+def own_change(information: Array, score: Array, size: float, dof: float) -> Array:
     """Logarithm of the evidence that a gyro itself changed: in one parameter, any of them, or in all."""
     alone = np.einsum("...ii->...i", information)
     grown = 1.0 + size**2 * alone
-    single = 0.5 * score**2 * size**2 / grown - 0.5 * np.log(grown)
+    single = tempered(0.5 * score**2 * size**2 / grown, dof) - 0.5 * np.log(grown)
     posterior = information + np.eye(8) / size**2
     _, log_det = np.linalg.slogdet(posterior * size**2)
     explained = np.einsum("...i,...i->...", score, np.linalg.solve(posterior, score[..., None])[..., 0])
-    whole = 0.5 * explained - 0.5 * log_det
+    whole = tempered(0.5 * explained, dof) - 0.5 * log_det
     return np.asarray(
         special.logsumexp(np.concatenate((single, whole[..., None]), axis=-1), axis=-1) - np.log(9)
     )
@@ -98,8 +107,8 @@ class Shared:
     ----------
     log_evidence : (K,) array
         Against none.
-    alone : (K,) array
-        The largest part of it that hangs on one gyro.
+    without : (K,) array
+        What is left of it without the gyro that lends most.
     leading : (K,) int array
         Label of that gyro.
     value : (K, q) array
@@ -108,7 +117,7 @@ class Shared:
     """
 
     log_evidence: Array
-    alone: Array
+    without: Array
     leading: Whole
     value: Array
     covariance: Array
@@ -148,8 +157,8 @@ def shared(splits: Splits, signatures: Array, prior: Array) -> Shared:
     _, log_det = np.linalg.slogdet(normal @ prior)
     explained = each.sum(axis=0) - 0.5 * np.einsum("kq,qr,kr->k", value, inverse, value)
     return Shared(
-        log_evidence=explained - 0.5 * log_det,
-        alone=each.max(axis=0),
+        log_evidence=tempered(explained, splits.dof) - 0.5 * log_det,
+        without=tempered(explained - each.max(axis=0), splits.dof) - 0.5 * log_det,
         leading=splits.gyros[np.argmax(each, axis=0)],
         value=value,
         covariance=np.linalg.inv(normal),

@@ -15,16 +15,20 @@ the later and after the earlier date, r² = w·(1 − w')/(w'·(1 − w)).
 """
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from scipy import optimize, special
 
 from solver.drift.attribution import StandHistory, places_of, signatures_of
-from solver.drift.belief import Belief, log_date_odds
+from solver.drift.belief import Belief, log_date_odds, tempered
 from solver.drift.common_shift import split
 from solver.drift.stand_changes import KIND_WEIGHTS, SPANS, differences
 from solver.drift.starts import Starts
 from solver.records import Array
+
+_FARTHEST: Final = 1e6
+"""Square of the largest score looked at: what a thousand standard deviations do not show is not detectable."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,10 +112,18 @@ def _by_parameters(starts: Starts, session: int, belief: Belief, power: float) -
     each = np.einsum("mp,mpq,mq->m", starts.signature, starts.precision, starts.signature)
     dates = log_date_odds(starts.time[np.r_[0, places]], belief.moves)
     sums = np.cumsum(each)[np.r_[places - 1, len(each) - 1]]
-    return _smallest(along, sums, dates, int(np.searchsorted(places, after)), belief, power)
+    return _smallest(along, sums, dates, int(np.searchsorted(places, after)), belief, power, starts.dof)
 
 
-def _smallest(information: Array, sums: Array, dates: Array, at: int, belief: Belief, power: float) -> float:
+def _smallest(
+    information: Array,
+    sums: Array,
+    dates: Array,
+    at: int,
+    belief: Belief,
+    power: float,
+    dof: float | None = None,
+) -> float:
     """The turn found with probability `power` at one of the dates.
 
     Parameters
@@ -134,7 +146,12 @@ def _smallest(information: Array, sums: Array, dates: Array, at: int, belief: Be
     level = dates - 0.5 * np.log1p(grown)
 
     def missing(square: float) -> float:
-        return float(special.logsumexp(level + steep * square)) - belief.log_odds
+        gain = steep * square
+        return (
+            float(special.logsumexp(level + (gain if dof is None else tempered(gain, dof)))) - belief.log_odds
+        )
 
-    z = float(np.sqrt(optimize.brentq(missing, 0.0, 1e6))) if missing(0.0) < 0.0 else 0.0
+    if missing(_FARTHEST) < 0.0:
+        return np.inf
+    z = float(np.sqrt(optimize.brentq(missing, 0.0, _FARTHEST))) if missing(0.0) < 0.0 else 0.0
     return (z + float(special.ndtri(power))) / float(np.sqrt(information[at]))

@@ -57,6 +57,13 @@ def test_without_sessions_on_both_sides_nothing_is_detectable(history):
         assert {found.azimuth, found.level_north, found.level_east} == {np.inf}
 
 
+def test_a_scatter_known_from_nothing_shows_no_turn_about_east(history):
+    few = type(history)(*(getattr(history, name)[:9] for name in history.__slots__))
+    found = detectable(few, session=5)
+    assert found.level_east == np.inf
+    assert found.azimuth < np.inf
+
+
 def test_a_turn_about_east_of_that_size_is_found():
     """Of 1.3 times the size by which 95 % are found, three of three stands are (p = 1 − 0.995³ otherwise)."""
     still = [detectable(one) for one in stand_histories(draw_laboratory(77))]
