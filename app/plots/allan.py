@@ -143,6 +143,4 @@ def template() -> Spec:
         ),
         *(layer for channel in _LOOKS for layer in series(channel)),
     ]
-    chart = alt.layer(*layers).properties(height=HEIGHT_PX)
-    names = ("first", "last", "low", "high")
-    return template_of(chart.add_params(*(alt.param(name=name, value=1.0) for name in names)))
+    return template_of(layers, height=HEIGHT_PX, values=dict.fromkeys(("first", "last", "low", "high"), 1.0))

@@ -68,5 +68,4 @@ def template() -> Spec:
             for name, dash in _DASHES.items()
         ),
     ]  # fmt: skip
-    chart = alt.layer(*layers).properties(height=HEIGHT_PX)
-    return template_of(chart.add_params(alt.param(name="low", value=-0.1), alt.param(name="last", value=1.0)))
+    return template_of(layers, height=HEIGHT_PX, values={"low": -0.1, "last": 1.0})

@@ -112,10 +112,8 @@ def template() -> Spec:
         levels.mark_rule(**theme.ZERO_LINE, aria=False).encode(y=y),
         *(layer for sign in _DASHES for layer in layers_of(sign)),
     ]
-    params = [alt.param(name=name, value=1.0) for name in ("first", "last", "low", "high")]
-    return template_of(alt.layer(*layers).properties(height=200).add_params(
-        *params, alt.param(name="ticks", value=[0.0])
-    ))  # fmt: skip
+    ranges = dict.fromkeys(("first", "last", "low", "high"), 1.0)
+    return template_of(layers, height=200, values=ranges | {"ticks": [0.0]})
 
 
 _DECADES: Final = (

@@ -111,6 +111,5 @@ def template(with_dates: bool, step: int) -> Spec:
             x=x, y=alt.value(alt.ExprRef("height")), text="text:N"
         ),
     ]  # fmt: skip
-    chart = alt.layer(*layers).properties(height=HEIGHT_PX)
-    names = ("low", "high", "first", "last")
-    return template_of(chart.add_params(*(alt.param(name=name, value=0.0) for name in names)))
+    ranges = dict.fromkeys(("low", "high", "first", "last"), 0.0)
+    return template_of(layers, height=HEIGHT_PX, values=ranges)

@@ -103,11 +103,4 @@ def template() -> Spec:
         ),
         *(layer for name in LOOKS for layer in series(name)),
     ]
-    chart = alt.layer(*layers).properties(height=HEIGHT_PX)
-    return template_of(
-        chart.add_params(
-            alt.param(name="low", value=1e-13),
-            alt.param(name="high", value=1.0),
-            alt.param(name="rounds", value=[1]),
-        )
-    )
+    return template_of(layers, height=HEIGHT_PX, values={"low": 1e-13, "high": 1.0, "rounds": [1]})

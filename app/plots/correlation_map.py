@@ -74,4 +74,4 @@ def template(order: tuple[str, ...]) -> Spec:
             href=alt.Href("href:N"), description=alt.Description("name:N"), tooltip=alt.Tooltip("name:N")
         ),
     ]
-    return template_of(alt.layer(*layers).properties(height=_CELL_PX))
+    return template_of(layers, height=_CELL_PX)

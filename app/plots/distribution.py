@@ -134,8 +134,4 @@ def template() -> Spec:
         *dots("conditional", theme.CONDITIONAL_POINT),
         *dots("beyond", theme.BEYOND_POINT),
     ]
-    return template_of(
-        alt.layer(*layers)
-        .properties(height=_LEAST_PX)
-        .add_params(*(alt.param(name=name, value=1.0) for name in ("low", "high", "top")))
-    )
+    return template_of(layers, height=_LEAST_PX, values=dict.fromkeys(("low", "high", "top"), 1.0))

@@ -208,12 +208,4 @@ def template(with_dates: bool, step: int) -> Spec:
         named("today", theme.LABEL, alt.value(-3), baseline="bottom"),
         named("changes", theme.BEYOND_LABEL, alt.value(alt.ExprRef("height")), baseline="bottom"),
     ]
-    chart = alt.layer(*layers).properties(height=HEIGHT_PX)
-    return template_of(
-        chart.add_params(
-            alt.param(name="low", value=-1.0),
-            alt.param(name="high", value=1.0),
-            alt.param(name="first", value=0),
-            alt.param(name="last", value=1),
-        )
-    )
+    return template_of(layers, height=HEIGHT_PX, values={"low": -1.0, "high": 1.0, "first": 0, "last": 1})

@@ -102,8 +102,7 @@ def template(channel: str) -> Spec:
         alt.Chart(alt.NamedData("trace")).mark_line(**line).encode(x=x, y=y, detail="piece:N"),
         alt.Chart(alt.NamedData("now")).mark_point(**point, aria=False).encode(x=x, y=y),
     ]
-    params = [alt.param(name=name, value=value) for name, value in _DEFAULTS.items()]
-    return template_of(alt.layer(*layers).properties(height=HEIGHT_PX).add_params(*params))
+    return template_of(layers, height=HEIGHT_PX, values=_DEFAULTS)
 
 
 _DEFAULTS: Final = {"low": 0.0, "high": 1.0, "first": 0.0, "last": SHORTEST_S, "blank": True}

@@ -98,7 +98,6 @@ def template(x_title: str, y_title: str) -> Spec:
         stair.mark_line(**theme.JOIN, interpolate="step-after", aria=False),
         *(layer for kind in LOOKS for layer in points(kind)),
     ]
-    chart = alt.layer(*layers).properties(height=HEIGHT_PX)
-    ranges = ("xLow", "xHigh", "yLow", "yHigh")
-    spec = template_of(chart.add_params(*(alt.param(name=name, value=0.0) for name in ranges)))
+    ranges = dict.fromkeys(("xLow", "xHigh", "yLow", "yHigh"), 0.0)
+    spec = template_of(layers, height=HEIGHT_PX, values=ranges)
     return {**spec, "padding": {"left": 0, "top": 4, "right": 4, "bottom": 8}}  # room for the axes' titles

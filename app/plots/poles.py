@@ -108,8 +108,6 @@ def template() -> Spec:
             for kind, look in LOOKS.items()
         ),
     ]  # fmt: skip
-    chart = alt.layer(*layers).properties(height=HEIGHT_PX)
-    numbers = ("linear", "xLow", "xHigh", "yLow", "yHigh")
-    params = [alt.param(name=name, value=1.0) for name in numbers]
-    params += [alt.param(name=name, value=[0.0]) for name in ("xTicks", "yTicks")]
-    return template_of(chart.add_params(*params))
+    numbers = dict.fromkeys(("linear", "xLow", "xHigh", "yLow", "yHigh"), 1.0)
+    ticks = {"xTicks": [0.0], "yTicks": [0.0]}
+    return template_of(layers, height=HEIGHT_PX, values=numbers | ticks)

@@ -92,12 +92,5 @@ def template(channel: str) -> Spec:
             tooltip=alt.Tooltip("name:N"),
         ),
     ]  # fmt: skip
-    chart = alt.layer(*layers).properties(height=HEIGHT_PX)
-    return template_of(
-        chart.add_params(
-            alt.param(name="low", value=0.0),
-            alt.param(name="high", value=1.0),
-            alt.param(name="first", value=0.0),
-            alt.param(name="last", value=1.0),
-        )
-    )
+    ranges = {"low": 0.0, "high": 1.0, "first": 0.0, "last": 1.0}
+    return template_of(layers, height=HEIGHT_PX, values=ranges)

@@ -183,12 +183,5 @@ def template() -> Spec:
             x=x, y=y("v"), text="label:N"
         ),
     ]  # fmt: skip
-    chart = alt.layer(*layers).properties(height=HEIGHT_PX)
-    return template_of(
-        chart.add_params(
-            alt.param(name="low", value=-1.0),
-            alt.param(name="high", value=1.0),
-            alt.param(name="numbers", value=[1]),
-            alt.param(name="labels", value=[["", ""]]),
-        )
-    )
+    values = {"low": -1.0, "high": 1.0, "numbers": [1], "labels": [["", ""]]}
+    return template_of(layers, height=HEIGHT_PX, values=values)

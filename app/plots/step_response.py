@@ -77,6 +77,4 @@ def template() -> Spec:
             y=alt.value(2), text="text:N"
         ),
     ]
-    chart = alt.layer(*layers).properties(height=HEIGHT_PX)
-    names = ("last", "low", "high")
-    return template_of(chart.add_params(*(alt.param(name=name, value=1.0) for name in names)))
+    return template_of(layers, height=HEIGHT_PX, values=dict.fromkeys(("last", "low", "high"), 1.0))

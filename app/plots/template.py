@@ -1,6 +1,6 @@
 """From an Altair chart, written once, to the document of one request."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from app.plots import theme
@@ -9,16 +9,30 @@ from app.plots.theme import Spec
 Row = Mapping[str, Any]
 
 
-def template_of(chart: Any) -> Spec:
-    """What Altair makes of a chart with named data; a test checks it against Vega-Lite's schema.
+def template_of(layers: Sequence[Any], *, height: int, values: Mapping[str, Any] | None = None) -> Spec:
+    """What Altair makes of charts with named data in layers; a test checks it against Vega-Lite's schema.
 
-    Charts fill the width of their container and keep the size of their text.
+    Charts fill the width of their container and keep the size of their text. What belongs to the whole
+    is put into Altair's document, not into its chart: each change of a chart copies all layers several times.
+
+    Parameters
+    ----------
+    layers
+        Charts, the lowest first.
+    height
+        Height in px.
+    values
+        The chart's parameters and the values that they have in the template.
     """
-    spec: Spec = chart.properties(
-        width="container", autosize={"type": "fit-x", "contains": "padding"}, padding=0
-    ).to_dict(validate=False)
+    import altair as alt
+
+    spec: Spec = alt.layer(*layers).to_dict(validate=False)
     spec.pop("config", None)
-    return spec
+    whole = {
+        "height": height, "width": "container", "autosize": {"type": "fit-x", "contains": "padding"}, "padding": 0,
+    }  # fmt: skip
+    params = [{"name": name, "value": value} for name, value in (values or {}).items()]
+    return {**spec, **whole, **({"params": params} if params else {})}
 
 
 def filled(

@@ -18,7 +18,7 @@ from app.plots.record import template as record_template
 from app.plots.residuals import template as residuals_template
 from app.plots.step_response import template as step_response_template
 
-_DELAY_S: Final = 2.0
+_DELAY_S: Final = 10.0
 
 
 def warm_up() -> threading.Timer:
