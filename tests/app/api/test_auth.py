@@ -4,13 +4,9 @@ import re
 
 import httpx
 import pytest
-from serving import Service
+from serving import Service, described
 
-from app import api
-
-CALLS = [
-    (method.upper(), path) for path, methods in api.create().openapi()["paths"].items() for method in methods
-]
+CALLS = [(method.upper(), path) for path, methods in described()["paths"].items() for method in methods]
 
 
 def called(client: httpx.Client, method: str, path: str) -> httpx.Response:

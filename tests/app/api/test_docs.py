@@ -3,9 +3,8 @@ from html.parser import HTMLParser
 
 import httpx
 import pytest
-from serving import API, Service
+from serving import API, Service, described
 
-from app import api
 from app.api.docs import KINDS
 
 
@@ -33,7 +32,7 @@ class Links(HTMLParser):
 
 def test_every_call_stands_on_the_page(page: httpx.Response) -> None:
     assert page.status_code == 200
-    for path, methods in api.create().openapi()["paths"].items():
+    for path, methods in described()["paths"].items():
         for method in methods:
             assert f"{method.upper()} {path}" in page.text
     assert f"under <code>{API}</code>" in page.text

@@ -1,5 +1,6 @@
 """A laboratory of one gyro, one stand and one certificate, with the real ledger and no processes."""
 
+import shutil
 from collections.abc import Callable, Iterator
 from datetime import date
 from pathlib import Path
@@ -39,15 +40,23 @@ def queue() -> HandQueue:
     return HandQueue()
 
 
+@pytest.fixture(scope="session")
+def prepared(tmp_path_factory: pytest.TempPathFactory, empty_data: Path) -> Path:
+    """The laboratory's folder, to be copied: hashing a password is slow on purpose."""
+    data = Path(shutil.copytree(empty_data, tmp_path_factory.mktemp("prepared") / "data"))
+    with open_lab(Settings(data=data)) as opened, opened.write(SYSTEM) as work:
+        access.add_account(work, "petrova", "technician", "a good password")
+        gyros.add_gyro(work, "0417", "GVK-6")
+        stands.add_stand(work, "S1", 55.7558)
+        rows = [CertificateRow(theta, psi, 6.9, -16.4, 6.6, 0.5, 0.5, 0.5) for theta, psi in PLACES]
+        stands.add_certificate(work, "S1", "C-17", date(2000, 1, 1), date(2100, 1, 1), rows)
+    return data
+
+
 @pytest.fixture
-def lab(tmp_path: Path, queue: HandQueue) -> Iterator[Lab]:
-    with open_lab(Settings(data=tmp_path / "data"), queue) as opened:
-        with opened.write(SYSTEM) as work:
-            access.add_account(work, "petrova", "technician", "a good password")
-            gyros.add_gyro(work, "0417", "GVK-6")
-            stands.add_stand(work, "S1", 55.7558)
-            rows = [CertificateRow(theta, psi, 6.9, -16.4, 6.6, 0.5, 0.5, 0.5) for theta, psi in PLACES]
-            stands.add_certificate(work, "S1", "C-17", date(2000, 1, 1), date(2100, 1, 1), rows)
+def lab(tmp_path: Path, queue: HandQueue, prepared: Path) -> Iterator[Lab]:
+    data = Path(shutil.copytree(prepared, tmp_path / "data"))
+    with open_lab(Settings(data=data), queue) as opened:
         yield opened
 
 

@@ -1,5 +1,4 @@
 from datetime import UTC, date, datetime, timedelta
-from pathlib import Path
 
 import pytest
 
@@ -14,8 +13,8 @@ NOW = datetime(2026, 6, 1, tzinfo=UTC)
 
 
 @pytest.fixture
-def work(tmp_path: Path):
-    with open_lab(Settings(data=tmp_path)) as lab, lab.write(access.SYSTEM) as found:
+def work(settings: Settings):
+    with open_lab(settings) as lab, lab.write(access.SYSTEM) as found:
         gyros.add_gyro(found, "A", "T")
         for name, latitude in (("S1", 56.0), ("S2", -34.0)):
             stands.add_stand(found, name, latitude)

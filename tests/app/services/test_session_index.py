@@ -2,7 +2,6 @@
 
 from collections import Counter
 from datetime import date
-from pathlib import Path
 
 import pytest
 
@@ -25,8 +24,8 @@ class Quiet:
 
 
 @pytest.fixture
-def work(tmp_path: Path):
-    with open_lab(Settings(data=tmp_path), Quiet()) as lab, lab.write(access.SYSTEM) as found:
+def work(settings: Settings):
+    with open_lab(settings, Quiet()) as lab, lab.write(access.SYSTEM) as found:
         for serial in ("A", "B"):
             gyros.add_gyro(found, serial, "T")
         for name in ("S1", "S2"):
