@@ -52,7 +52,7 @@ class Wanted(Incoming):
     until: Annotated[Until, Field(alias="to", description="Not after this time or day.")] = None
     method: Method = "least-squares"
     by: Annotated[By, Field(description="What a point stands for.")] = "session"
-    points: Annotated[int, Field(ge=3, le=100_000, description="Most points of a parameter.")] = (
+    points: Annotated[int, Field(ge=4, le=100_000, description="Most points of a parameter.")] = (
         reading.MOST_POINTS
     )
 
