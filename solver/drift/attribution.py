@@ -32,6 +32,8 @@ Direction = Literal["azimuth", "level-north", "both", "level-east", "certificate
 _LIKELY: Final = 1e-3
 _MOST: Final = 8
 _MOST_DATES: Final = 400
+_BLUNDER: Final = 1e-4
+"""Probability of residuals as large as those of a session that is left out."""
 _OTHERS: Final = float(np.log(3.0))
 """Logarithm of the evidence that must be left without the gyro on which most of it hangs."""
 
@@ -55,6 +57,10 @@ class StandHistory:
         NaN where not shown.
     correlation : (n,) array
         Of the two.
+    chi2, dof : (n,) array or None
+        χ² of each session's residuals and its degrees of freedom; NaN where u(J) is not given. A session whose
+        residuals are too large by more than a turn explains, and by more than those of the other sessions,
+        has a blunder in it and tells nothing of the stand.
     """
 
     time: Array
@@ -69,11 +75,21 @@ class StandHistory:
     u_turn: Array
     correlation: Array
     u_certificate: Array
+    chi2: Array | None = None
+    dof: Array | None = None
 
     @property
     def attitudes(self) -> Attitudes:
         """What the residuals show."""
-        return Attitudes.of(self.time, self.certificate, self.turn, self.u_turn, self.correlation)
+        every = Attitudes.of(self.time, self.certificate, self.turn, self.u_turn, self.correlation)
+        if self.chi2 is None or self.dof is None:
+            return every
+        freedom = np.maximum(self.dof - 2.0, 1.0)
+        rest = np.maximum(self.chi2 - every.explained, 0.0)
+        known = np.isfinite(rest)
+        usual = max(1.0, float(np.median((rest / freedom)[known]))) if known.any() else 1.0
+        blundered = special.chdtrc(freedom, rest / usual) < _BLUNDER
+        return every.without(blundered)
 
     @property
     def starts(self) -> Starts:

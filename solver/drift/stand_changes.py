@@ -89,6 +89,17 @@ class Attitudes:
         score = np.where(seen, estimate, 0.0) * root**2
         return cls(np.asarray(time, np.float64), np.asarray(certificate, np.int64), information, score)
 
+    @property
+    def explained(self) -> Array:
+        """What the two turns take from the χ² of each session's residuals, (n,)."""
+        inverse = np.linalg.pinv(self.information, rcond=_SEEN, hermitian=True)
+        return np.asarray(np.einsum("ni,nij,nj->n", self.score, inverse, self.score))
+
+    def without(self, which: NDArray[np.bool_]) -> "Attitudes":
+        """The same where some sessions (n,) tell nothing."""
+        information = np.where(which[:, None, None], 0.0, self.information)
+        return Attitudes(self.time, self.certificate, information, np.where(which[:, None], 0.0, self.score))
+
     def scattered(self, variance: float) -> "Attitudes":
         """The same with a scatter of the stand, τ² in rad²."""
         shrink = np.linalg.inv(np.eye(2) + variance * self.information)

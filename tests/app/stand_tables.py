@@ -48,6 +48,7 @@ def sessions(serials: list[str], months: int, seed: int) -> SeriesTable:
         "level_north_arcsec": rng.normal(0.0, U_LEVEL, count), "u_level_north_arcsec": np.full(count, U_LEVEL),
         "attitude_correlation": np.zeros(count), "u_certificate_azimuth_arcsec": np.full(count, 1.0),
         "u_certificate_level_north_arcsec": np.full(count, 1.0),
+        "chi2": np.full(count, np.nan), "fit_dof": np.full(count, np.nan),
     }  # fmt: skip
     own = signature()
     for name in PARAMETERS:

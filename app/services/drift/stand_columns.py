@@ -15,7 +15,7 @@ from solver.units import rad_from_arcsec
 
 _HEADS: Final = ("session", "calibration", "start", "measured_at", "certificate")
 _WANTED: Final = (
-    *_HEADS, *ATTITUDE, *(f"{name}.{part}" for name in PARAMETERS for part in ("value", "u_noise")),
+    *_HEADS, "chi2", "fit_dof", *ATTITUDE, *(f"{name}.{part}" for name in PARAMETERS for part in ("value", "u_noise")),
     *(f"level_east.{name}" for name in PARAMETERS),
 )  # fmt: skip
 _EMPTY: Final[dict[str, str]] = {
@@ -66,6 +66,7 @@ def history(table: SeriesTable) -> StandHistory:
         u_turn=columns("u_level_north_arcsec", "u_azimuth_arcsec") * arcsec,
         correlation=np.asarray(table["attitude_correlation"], np.float64),
         u_certificate=columns("u_certificate_level_north_arcsec", "u_certificate_azimuth_arcsec") * arcsec,
+        chi2=np.asarray(table["chi2"], np.float64), dof=np.asarray(table["fit_dof"], np.float64),
     )  # fmt: skip
 
 

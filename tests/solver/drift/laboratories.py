@@ -44,6 +44,7 @@ def stand_histories(laboratory: LaboratoryLife) -> list[StandHistory]:
                 start=labels[on, 2], value=solution.values[on], u=u[on], level_east=east[on],
                 turn=turns.value[on], u_turn=turns.u[on], correlation=turns.correlation[on],
                 u_certificate=np.zeros((on.sum(), 2)),
+                chi2=solution.chi2[on], dof=np.full(on.sum(), 2.0 * means.jx.shape[1] - 8.0),
             )
         )  # fmt: skip
     return histories

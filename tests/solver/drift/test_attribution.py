@@ -22,9 +22,14 @@ def moved():
     return stand_histories(draw_laboratory(11, moves=moves))
 
 
+def cut(history, which):
+    """Some of the sessions."""
+    return type(history)(*(getattr(history, name)[which] for name in history.__slots__))
+
+
 def shortened(history, last):
     """The history as it was after so many sessions."""
-    return type(history)(*(getattr(history, name)[:last] for name in history.__slots__))
+    return cut(history, slice(last))
 
 
 @pytest.mark.parametrize(("number", "direction"), list(enumerate(TURNS)))
@@ -93,7 +98,7 @@ def test_what_one_gyro_alone_shows_of_a_turn_about_east_is_unclear():
     )
     (history,) = stand_histories(laboratory)
     kept = (history.gyro == 0) | (history.time < 2.0 * YEAR)
-    alone = type(history)(*(getattr(history, name)[kept] for name in history.__slots__))
+    alone = cut(history, kept)
     (unclear,) = attribute(alone)
     assert (unclear.verdict, unclear.direction, unclear.gyro) == ("unclear", "level-east", 0)
     # What is left are the rates of change that were believed before: 0.1 and 0.3 a year.
@@ -139,6 +144,21 @@ def test_a_new_certificate_that_errs_is_told_unless_it_says_so():
     assert all(finding.verdict == "none" for name, finding in forgiven.items() if name != "certificate")
 
 
+def test_a_session_with_a_blunder_tells_nothing_of_the_stand():
+    """A wrong reading of one position by 3 °/h: 60 of noise in an equation, 15 in azimuth."""
+    laboratory = draw_laboratory(51, gyros=4, stands=1, years=2.0)
+    (history,) = stand_histories(laboratory)
+    turn, chi2 = history.turn.copy(), history.chi2.copy()
+    turn[-2:, 1] += 15 * history.u_turn[-2:, 1]
+    turn[-2:, 0] += 15 * history.u_turn[-2:, 0] * history.correlation[-2:]
+    # As the base would have turned: all of it explained.
+    chi2[-2:] += 15**2
+    moved = replace(history, turn=turn, chi2=chi2)
+    assert [finding.direction for finding in attribute(moved)] == ["azimuth"]
+    chi2[-2:] += 60**2 - 15**2
+    assert attribute(replace(history, turn=turn, chi2=chi2)) == ()
+
+
 def test_a_larger_threshold_finds_less(moved):
     history = moved[2]
     true = int(np.searchsorted(history.time, MOVED))
@@ -152,7 +172,7 @@ def test_sessions_of_one_start_count_as_one_start(moved):
     """The same means given three times in one start: no start more, and the scatter of starts the same."""
     history = moved[1]
     every = np.repeat(np.arange(len(history.time)), 3)
-    tripled = type(history)(*(getattr(history, name)[every] for name in history.__slots__))
+    tripled = cut(history, every)
     once, thrice = history.starts, tripled.starts
     assert len(thrice.time) == len(once.time)
     np.testing.assert_allclose(thrice.value * thrice.scale, once.value * once.scale, rtol=1e-12)
