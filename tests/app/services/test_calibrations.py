@@ -11,6 +11,7 @@ from app.services.access import SYSTEM
 from app.services.computing import calibrate
 from app.services.ledger import MAX_ATTEMPTS, JobLedger
 from app.services.simulated import degrees, truth_values
+from app.store.tables import StandAttitude
 from simdevice.bench import mean_currents
 from simdevice.certificate import sixteen_positions
 from solver.units import ma_from_ampere
@@ -71,6 +72,18 @@ def test_the_provenance_is_complete(lab, measured):
     assert view.input_hash == view.result["input_hash"]
     assert view.result["least-squares"]["fit"]["dof"] == 24
     assert (view.revision, view.replaces, view.replaced_by) == (1, None, None)
+
+
+def test_the_stands_attitude_is_kept_beside_the_result(lab, measured):
+    job = run(lab, ask(lab, measured).id)
+    with lab.read(SYSTEM) as work:
+        view = calibrations.calibration(work, job.calibration)
+        row = work.db.get(StandAttitude, job.calibration)
+        told = view.result["least-squares"]["stand_attitude"]
+        assert {name: getattr(row, name) for name in told} == told
+    # The simulated base stands as certified, to the certificate's 0.5″: four standard deviations.
+    for name in ("azimuth_arcsec", "level_north_arcsec"):
+        assert abs(told[name]) < 4 * told[f"u_{name}"] < 200
 
 
 def test_solving_the_same_again_gives_the_same_bytes_and_no_new_revision(lab, measured):
