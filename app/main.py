@@ -17,7 +17,8 @@ from app import api, logs, pages, plots
 from app.errors import AppError, Forbidden, problem
 from app.jobs.engine import JobEngine
 from app.middleware import BodyLimit, LastResort, RequestLog, SameSite, SecurityHeaders
-from app.services import uploads
+from app.services import access, uploads
+from app.services.drift import following
 from app.services.lab import Lab
 from app.services.ledger import JobLedger
 from app.services.opening import open_lab
@@ -37,6 +38,8 @@ def working_lab(settings: Settings) -> Iterator[Lab]:
         engine = JobEngine(settings.url, JobLedger(lab), slots=settings.workers, preload=_PRELOAD)
         lab.queue = engine
         engine.start()
+        with lab.write(access.SYSTEM) as work:
+            following.catch_up(work)
         uploads.sweep(settings.uploads, _LEFT_BEHIND)
         try:
             yield lab

@@ -3,10 +3,12 @@
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Query, Request, Response
+from pydantic import Field
 
 from app.api.auth import Reader
-from app.api.pagination import TABLE_TOO, Columns, Listing, cut, listed
-from app.api.schemas.due import Due, DuePart
+from app.api.pagination import TABLE_TOO, Columns, Listing, Part, cut, listed
+from app.api.schemas.common import Name
+from app.api.schemas.due import Due, State
 from app.services.drift import due
 
 router = APIRouter(tags=["drift"])
@@ -24,6 +26,13 @@ _COLUMNS: Final[Columns[Due]] = {
     "measured_at": lambda item: item.measured_at,
     "stand": lambda item: item.stand,
 }
+
+
+class DuePart(Part):
+    """Which gyros."""
+
+    type: Name | None = None
+    state: Annotated[State | None, Field(description="Only gyros in this state.")] = None
 
 
 @router.get("/due", response_model=Listing[Due], responses=TABLE_TOO)

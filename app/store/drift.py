@@ -1,4 +1,4 @@
-"""Queries for the drift history: what a study is made of, studies, events, baselines, alarms."""
+"""Queries for the drift history: studies, events, baselines, alarms."""
 
 from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
@@ -18,98 +18,7 @@ from app.store.tables import (
     Job,
     MeasuringSession,
     Stand,
-    StandAttitude,
-    StandCertificate,
-    Start,
 )
-
-
-class ResultRow(NamedTuple):
-    """One revision of one session's result, with what is known of the session."""
-
-    calibration: int
-    session: int
-    revision: int
-    input_hash: str
-    solver_version: str
-    chi2: float | None
-    fit_dof: int | None
-    measured_at: datetime
-    temperature_c: float | None
-    start: int
-    start_at: datetime
-    stand: str
-    certificate: str
-    azimuth_arcsec: float | None
-    u_azimuth_arcsec: float | None
-    level_north_arcsec: float | None
-    u_level_north_arcsec: float | None
-    attitude_correlation: float | None
-    u_certificate_azimuth_arcsec: float | None
-    u_certificate_level_north_arcsec: float | None
-    level_east: dict[str, float] | None
-
-
-class ValueRow(NamedTuple):
-    """One parameter of one result by one method."""
-
-    calibration: int
-    method: str
-    parameter: str
-    value: float | None
-    u: float | None
-    k: float | None
-    u_noise: float | None
-
-
-def result_rows(db: Session, gyro_id: int) -> Sequence[ResultRow]:
-    """Every revision of every result of a gyro, in the order of the sessions' times, then of revisions."""
-    rows = db.execute(
-        sa.select(
-            Calibration.id, Calibration.session_id, Calibration.revision, Calibration.input_hash,
-            Calibration.solver_version, Calibration.chi2, Calibration.fit_dof, MeasuringSession.started_at,
-            MeasuringSession.temperature_c, Start.number, Start.powered_up_at, Stand.name,
-            StandCertificate.number, StandAttitude.azimuth_arcsec, StandAttitude.u_azimuth_arcsec,
-            StandAttitude.level_north_arcsec, StandAttitude.u_level_north_arcsec, StandAttitude.correlation,
-            StandAttitude.u_certificate_azimuth_arcsec, StandAttitude.u_certificate_level_north_arcsec,
-            StandAttitude.level_east,
-        )
-        .select_from(MeasuringSession)
-        .join(Calibration, Calibration.session_id == MeasuringSession.id)
-        .join(Start, Start.id == MeasuringSession.start_id)
-        .join(Stand, Stand.id == MeasuringSession.stand_id)
-        .join(StandCertificate, StandCertificate.id == Calibration.certificate_id)
-        .outerjoin(StandAttitude, StandAttitude.calibration_id == Calibration.id)
-        .where(MeasuringSession.gyro_id == gyro_id)
-        .order_by(MeasuringSession.started_at, MeasuringSession.id, Calibration.revision)
-    )  # fmt: skip
-    return [ResultRow._make(row) for row in rows]
-
-
-def value_rows(db: Session, gyro_id: int) -> Sequence[ValueRow]:
-    """Every parameter of every result of a gyro, by every method."""
-    value = CalibrationParameter
-    rows = db.execute(
-        sa.select(
-            value.calibration_id, value.method, value.parameter, value.value, value.standard_uncertainty,
-            value.coverage_factor, value.u_noise,
-        )
-        .select_from(MeasuringSession)
-        .join(Calibration, Calibration.session_id == MeasuringSession.id)
-        .join(value, value.calibration_id == Calibration.id)
-        .where(MeasuringSession.gyro_id == gyro_id)
-    )  # fmt: skip
-    return [ValueRow._make(row) for row in rows]
-
-
-def gyro_of_session(db: Session, session_id: int) -> tuple[int, int]:
-    """The gyro's and the stand's ids of a session."""
-    row = db.execute(
-        sa.select(MeasuringSession.gyro_id, MeasuringSession.stand_id).where(
-            MeasuringSession.id == session_id
-        )
-    ).one()
-    return row.gyro_id, row.stand_id
 
 
 def locked(db: Session, gyro_id: int | None, stand_id: int | None) -> None:
@@ -148,6 +57,35 @@ def jobs(db: Session, job_ids: Collection[str]) -> Sequence[Job]:
 def behind(db: Session, limit: int = 1000) -> Sequence[DriftStudy]:
     """Studies that something has come in for since they were made."""
     return db.scalars(sa.select(DriftStudy).where(DriftStudy.studied < DriftStudy.changed).limit(limit)).all()
+
+
+def without_study(db: Session) -> Sequence[tuple[int, str]]:
+    """Gyros with results by methods that no study is of: id and method."""
+    studied = sa.select(DriftStudy.gyro_id).where(DriftStudy.gyro_id.is_not(None))
+    rows = db.execute(
+        sa.select(MeasuringSession.gyro_id, CalibrationParameter.method)
+        .join(Calibration, Calibration.session_id == MeasuringSession.id)
+        .join(CalibrationParameter, CalibrationParameter.calibration_id == Calibration.id)
+        .where(MeasuringSession.gyro_id.not_in(studied))
+        .distinct()
+        .order_by(MeasuringSession.gyro_id, CalibrationParameter.method)
+    )
+    return [(row[0], row[1]) for row in rows]
+
+
+def outdated(db: Session, solver_version: str) -> Sequence[DriftStudy]:
+    """Studies that were made by another version of the solver."""
+    return db.scalars(
+        sa.select(DriftStudy).where(
+            DriftStudy.solver_version.is_not(None), DriftStudy.solver_version != solver_version
+        )
+    ).all()
+
+
+def unattended(db: Session) -> Sequence[DriftStudy]:
+    """Studies that are behind, and that no job waits or runs for."""
+    at_work = sa.exists().where(Job.id == DriftStudy.job_id, Job.state.in_(("queued", "running")))
+    return db.scalars(sa.select(DriftStudy).where(DriftStudy.studied < DriftStudy.changed, ~at_work)).all()
 
 
 def gyros_on(db: Session, stand_id: int) -> Sequence[int]:

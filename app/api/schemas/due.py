@@ -1,21 +1,13 @@
 """When gyros are due."""
 
 from datetime import date, datetime
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict
 
-from app.api.pagination import Part
-from app.api.schemas.common import Name, Outgoing
+from app.api.schemas.common import Outgoing
 
 State = Literal["overdue", "never", "due-soon", "valid", "no-interval"]
-
-
-class DuePart(Part):
-    """Which gyros."""
-
-    type: Name | None = None
-    state: Annotated[State | None, Field(description="Only gyros in this state.")] = None
 
 
 class Due(Outgoing):

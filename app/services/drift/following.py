@@ -15,6 +15,7 @@ from app.services import jobs
 from app.services.lab import Work
 from app.store import drift
 from app.store.tables import DriftStudy
+from solver import __version__
 
 KIND: Final = "follow"
 STAND_METHOD: Final = "least-squares"
@@ -54,6 +55,24 @@ def changed_type(work: Work, type_id: int) -> None:
     """A type's limits or interval are others now."""
     for gyro_id in drift.gyros_of_type(work.db, type_id):
         _count(work, {"gyro": gyro_id}, ())
+
+
+def catch_up(work: Work) -> None:
+    """See to it that a job will make every study that is missing, behind without a job, or of another solver.
+
+    For the start of the service: results may be older than the studies, and a job may have failed.
+    """
+    for gyro_id, method in drift.without_study(work.db):
+        work.db.add(DriftStudy(gyro_id=gyro_id, method=method))
+    work.db.flush()
+    for row in drift.outdated(work.db, __version__):
+        row.changed += 1
+    work.db.flush()
+    rows = drift.unattended(work.db)
+    gyros = {row.gyro_id for row in rows if row.gyro_id is not None}
+    stands = {row.stand_id for row in rows if row.stand_id is not None}
+    for subject in (*({"gyro": key} for key in sorted(gyros)), *({"stand": key} for key in sorted(stands))):
+        _count(work, subject, ())
 
 
 def ids(subject: Subject) -> tuple[int | None, int | None]:

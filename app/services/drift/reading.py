@@ -26,7 +26,7 @@ from app.services.job_views import job_view
 from app.services.lab import Work
 from app.services.verdicts import judge
 from app.services.views import COVERAGE_FACTOR
-from app.store import drift, results
+from app.store import drift, drift_series, results
 from app.store.tables import DriftStudy, Gyro
 from solver.records import PARAMETERS
 
@@ -130,8 +130,8 @@ def replaced(work: Work, serial: str, *, method: str = "least-squares") -> tuple
     """Results of a gyro by a method that count no more, with the one that counts in their place, if any."""
     _check(method, (), "session")
     gyro = find_gyro(work, serial)
-    rows = drift.result_rows(work.db, gyro.id)
-    values = [item for item in drift.value_rows(work.db, gyro.id) if item.method == method]
+    rows = drift_series.result_rows(work.db, gyro.id)
+    values = [item for item in drift_series.value_rows(work.db, gyro.id) if item.method == method]
     solved = {item.calibration for item in values}
     counting = {row.session: row.calibration for row in series.counting(rows, dict.fromkeys(solved))}
     gone = {

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from app.services.lab import Work
 from app.services.views import COVERAGE_FACTOR
-from app.store import drift
-from app.store.drift import ResultRow, ValueRow
+from app.store import drift, drift_series
+from app.store.drift_series import ResultRow, ValueRow
 from solver.drift.history import History
 from solver.records import PARAMETERS, Array
 
@@ -147,7 +147,7 @@ def load(work: Work, gyro_id: int, method: str) -> SeriesTable:
 
 def load_all(work: Work, gyro_id: int) -> dict[str, SeriesTable]:
     """A gyro's results by each method that gave one."""
-    rows, values = drift.result_rows(work.db, gyro_id), drift.value_rows(work.db, gyro_id)
+    rows, values = drift_series.result_rows(work.db, gyro_id), drift_series.value_rows(work.db, gyro_id)
     by_method: dict[str, dict[int, dict[str, ValueRow]]] = {}
     for item in values:
         by_method.setdefault(item.method, {}).setdefault(item.calibration, {})[item.parameter] = item

@@ -6,7 +6,7 @@ from app.services.computing import follow
 from app.services.drift import following, reading, series, studying
 from app.services.finding import find_gyro
 from app.services.ledger import JobLedger
-from app.store.tables import Job
+from app.store.tables import DriftStudy, Job
 
 
 def _jobs(lab, state="queued"):
@@ -114,3 +114,31 @@ def test_builders_without_an_engine_study_everything_at_once(lab, history):
     assert _drift(lab).up_to_date
     assert _jobs(lab) == []
     assert len(_jobs(lab, "succeeded")) == 1
+
+
+def test_at_the_start_results_older_than_the_studies_get_theirs(lab, history):
+    with lab.write(TECHNICIAN) as work:
+        work.db.query(DriftStudy).delete()
+        work.db.query(Job).delete()
+        following.catch_up(work)
+        following.catch_up(work)
+    assert len(_jobs(lab)) == 1
+    with lab.write(TECHNICIAN) as work:
+        studying.follow_all_now(work)
+        following.catch_up(work)
+        work.db.query(DriftStudy).update({"solver_version": "0.0.1"})
+    assert _jobs(lab) == []
+    with lab.write(TECHNICIAN) as work:
+        following.catch_up(work)
+    assert len(_jobs(lab)) == 1
+    assert not _drift(lab).up_to_date
+
+
+def test_at_the_start_a_failed_study_is_tried_again(lab, history):
+    (job_id,) = _jobs(lab)
+    ledger = JobLedger(lab)
+    assert ledger.begin(job_id) is not None
+    ledger.fail(job_id, [])
+    with lab.write(TECHNICIAN) as work:
+        following.catch_up(work)
+    assert len(_jobs(lab)) == 1
