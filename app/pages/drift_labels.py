@@ -54,7 +54,7 @@ EVENT_KINDS: Final = {
 _SOURCES: Final = {
     "within-position": marked("Within a position"), "between-positions": marked("Between positions"),
     "between-sessions": marked("Between sessions"), "between-starts": marked("Between starts"),
-    "between-days": marked("Between days"),
+    "between-days": marked("Between days"), "fixed": marked("The course itself"),
 }  # fmt: skip
 
 _STATUSES: Final = {

@@ -19,6 +19,7 @@ SOURCES: Final = (
     "between-starts",
     "between-days",
 )
+_DISTINGUISHED: Final = (*SOURCES, "fixed")
 Entry = Mapping[str, Any]
 _LEVEL: Final = 0.05
 
@@ -163,7 +164,8 @@ def _confounded(studied: Sequence[ParameterDrift]) -> str:
     for item in studied:
         for part in (item.study or {})["components"]:
             if part.get("confounded_with"):
-                groups[tuple(sorted((part["source"], *part["confounded_with"]), key=SOURCES.index))] = None
+                together = (part["source"], *part["confounded_with"])
+                groups[tuple(sorted(together, key=_DISTINGUISHED.index))] = None
     said = (" + ".join(drift_labels.source(name).lower() for name in group) for group in groups)
     text = "; ".join(said)
     return gettext("These sessions cannot tell apart: %(sources)s.") % {"sources": text} if text else ""

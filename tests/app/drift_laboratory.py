@@ -227,7 +227,7 @@ def _studied(table: series.SeriesTable, name: str, ahead: list[datetime]) -> dic
                   "slope_per_year": slope or None, "u_slope_per_year": 0.0023 if slope else None,
                   "p_value": 1e-4 if slope else 0.6,
                   "level": last, "time_constant_days": None, "scatter": u, "dof": 6.0,
-                  "tests": [{"against": "constant", "f": 61.2, "dof": 6.0, "p_value": 2e-4}]},
+                  "tests": [{"model": "linear", "against": "constant", "f": 61.2, "dof": [1.0, 6.0], "p_value": 2e-4}]},
         "forecast": {"probability": 0.95, "at": [item.isoformat() for item in ahead],
                      "value": [last + slope * year for year in years],
                      "low": [last + slope * year - 2 * u * (1 + year) for year in years],
