@@ -103,7 +103,7 @@ def named(side: Side) -> str:
     if kind == "gyro":
         return gettext("gyro %(serial)s") % {"serial": side.gyro}
     if kind == "result":
-        return gettext("result %(number)d") % {"number": side.calibration}
+        return gettext("result no. %(number)d") % {"number": side.calibration}
     return gettext("session %(number)d") % {"number": side.session}
 
 

@@ -137,7 +137,8 @@ def rows(fleet: Fleet, parameter: str, sort: str) -> list[Row]:
     )
     known = [item for gyro in fleet.gyros if (item := gyro.parameters.get(parameter))]
     slopes = _places([item.u_slope for item in known])
-    scatters = _places([item.scatter for item in known])
+    largest = max((item.scatter or 0.0 for item in known), default=0.0)
+    scatters = min(6, max(0, (decimals_of(largest) or 2) + 1))
     return [_row(gyro, gyro.parameters.get(parameter), slopes, scatters) for gyro in ordered]
 
 

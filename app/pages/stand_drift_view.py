@@ -111,7 +111,7 @@ def _changes(drift: StandDrift, direction: str) -> Iterator[plots.DriftChange]:
 
 def common(drift: StandDrift, parameter: str) -> plots.theme.Spec:
     """All gyros together, about one parameter."""
-    known = [item for item in drift.points if item.common[parameter] is not None]
+    known = [item for item in drift.together if item.common[parameter] is not None]
     means = [
         plots.CommonPoint(
             item.at, item.common[parameter] or 0.0, item.limits[parameter] or 0.0,

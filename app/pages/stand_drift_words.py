@@ -42,7 +42,10 @@ class Found:
 
 def findings(drift: StandDrift) -> list[Found]:
     """What was found, the stand's first, of those alike the latest first; judged certificates at the end."""
-    latest = sorted(entries(drift), key=lambda item: item["at"], reverse=True)
+    # At a new certificate each way of looking gives a finding; where nothing shows one of them says it.
+    quiet = {item["session"]: item for item in entries(drift) if item["verdict"] == "none"}
+    told = [item for item in entries(drift) if item["verdict"] != "none"]
+    latest = sorted([*told, *quiet.values()], key=lambda item: item["at"], reverse=True)
     rank = {name: number for number, name in enumerate(_WORST_FIRST)}
     ordered = sorted(
         latest, key=lambda item: (item["event"] is not None, rank.get(item["verdict"], len(rank)))

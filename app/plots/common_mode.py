@@ -89,7 +89,10 @@ def template(with_dates: bool, step: int) -> Spec:
     single: Spec = {"shape": "circle", "size": 14, "filled": False, "stroke": theme.colour("edge"),
                     "strokeWidth": 1, "opacity": 1}  # fmt: skip
     layers = [
-        changes.mark_rect(**theme.WASH, clip=True, aria=False).encode(x=x, x2="t2:T"),
+        # Not a field: two fields on an axis of stated ends make Vega-Lite warn of a conflict.
+        changes.mark_rect(**theme.WASH, clip=True, aria=False).encode(
+            x=x, x2=alt.value(alt.ExprRef("scale('x', datum.t2)"))
+        ),
         rows("zero").mark_rule(**theme.ZERO_LINE, aria=False).encode(y=y()),
         *(
             means.mark_line(**theme.CONTROL_LINE, interpolate="step", aria=False).encode(y=y(side))

@@ -74,4 +74,5 @@ def template(order: tuple[str, ...]) -> Spec:
             href=alt.Href("href:N"), description=alt.Description("name:N"), tooltip=alt.Tooltip("name:N")
         ),
     ]
-    return template_of(layers, height=_CELL_PX)
+    spec = template_of(layers, height=_CELL_PX)
+    return {**spec, "padding": {"left": 0, "top": 0, "right": 4, "bottom": 8}}  # room for the symbols' tails

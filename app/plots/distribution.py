@@ -14,6 +14,8 @@ _NEAR: Final = 0.75
 """A limit farther from the dots than this part of their range is told in words, not drawn."""
 _DOT: Final = 0.022
 """Width of a dot as part of the axis: dots nearer to each other than that are put one above the other."""
+_LABEL: Final = 0.09
+"""Width of a label as part of the axis."""
 _LANE_PX: Final = 11
 _AXIS_PX: Final = 30
 _LEAST_PX: Final = 44
@@ -59,10 +61,11 @@ def distribution(
     ]
     low, high = axis_range([*values, *(limit.value for limit in near)])
     lanes = _lanes(values, _DOT * (high - low))
+    sides = _sides(points, lanes, (low, high))
     rows = [
-        {"v": point.value, "lane": lane, "name": point.name, "label": point.label, "href": point.href,
-         "left": point.value > (low + high) / 2}
-        for point, lane in zip(points, lanes, strict=True)
+        {"v": point.value, "lane": lane, "name": point.name, "label": point.label if side else "",
+         "href": point.href, "left": side == "left"}
+        for point, lane, side in zip(points, lanes, sides, strict=True)
     ]  # fmt: skip
     tallest = max(lanes, default=0)
     return filled(
@@ -95,6 +98,24 @@ def _lanes(values: Sequence[float], width: float) -> list[int]:
         last[free] = values[place]
         lanes[place] = free
     return lanes
+
+
+def _sides(
+    points: Sequence[DistributionPoint], lanes: Sequence[int], ends: tuple[float, float]
+) -> list[Literal["left", "right"] | None]:
+    """On which side of each dot its label has room in its lane; None on neither."""
+    room = _LABEL * (ends[1] - ends[0])
+    found: list[Literal["left", "right"] | None] = []
+    for point, lane in zip(points, lanes, strict=True):
+        beside = [
+            other.value - point.value
+            for other, row in zip(points, lanes, strict=True)
+            if other is not point and row == lane
+        ]
+        right = point.value + room < ends[1] and not any(0 <= gap < 2 * room for gap in beside)
+        left = point.value - room > ends[0] and not any(-2 * room < gap <= 0 for gap in beside)
+        found.append("right" if right else "left" if left else None)
+    return found
 
 
 @cache

@@ -186,7 +186,10 @@ def template(with_dates: bool, step: int) -> Spec:
     limits, events, ahead = rows("limits"), rows("events"), rows("forecast")
     layers = [
         limits.mark_rect(**theme.WASH, clip=True, aria=False).encode(y=y("y"), y2="edge:Q"),
-        rows("changes").mark_rect(**theme.WASH, clip=True, aria=False).encode(x=x(), x2="t2:T"),
+        # Not a field: two fields on an axis of stated ends make Vega-Lite warn of a conflict.
+        rows("changes")
+        .mark_rect(**theme.WASH, clip=True, aria=False)
+        .encode(x=x(), x2=alt.value(alt.ExprRef("scale('x', datum.t2)"))),
         ahead.mark_area(**theme.FORECAST_BAND, clip=True, aria=False).encode(x=x(), y=y("low"), y2="high:Q"),
         ahead.mark_line(**theme.FORECAST_LINE, clip=True, aria=False).encode(x=x(), y=y()),
         control("centre", theme.CENTRE_LINE),

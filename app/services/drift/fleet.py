@@ -41,27 +41,26 @@ def fleet(work: Work, type_name: str) -> Fleet:
     studies = {row.gyro_id: row for row in stored.studies_of(work.db, list(ids.values()), METHOD)}
     alarms = stored.open_alarms(work.db, list(ids.values()), METHOD)
     results = stored.results_of(work.db, [item.calibration for item in holds if item.calibration is not None])
+    documents = {key: json.loads(row.document) for key, row in studies.items() if row.document is not None}
     gyros = tuple(
         _gyro(
-            item,
-            results.get(item.calibration or 0),
-            studies.get(ids[item.gyro]),
-            alarms.get(ids[item.gyro], 0),
+            item, results.get(item.calibration or 0), documents.get(ids[item.gyro], {}),
+            alarms=alarms.get(ids[item.gyro], 0), study=studies.get(ids[item.gyro]),
         )
         for item in sorted(holds, key=lambda item: item.gyro)
-    )
-    documents = [json.loads(row.document) for row in studies.values() if row.document is not None]
+    )  # fmt: skip
     return Fleet(
         type=kind.name, method=METHOD, gyros=gyros,
         distributions=fleet_statistics.distributions(gyros),
-        pooled=fleet_statistics.pooled(documents),
+        pooled=fleet_statistics.pooled(list(documents.values())),
         correlations=fleet_statistics.correlations(gyros),
         interval=_interval(kind.interval_days, gyros), counts=due.counts(holds),
     )  # fmt: skip
 
 
-def _gyro(holds: Due, result: Calibration | None, study: Studied | None, alarms: int) -> FleetGyro:
-    document: Document = json.loads(study.document) if study and study.document else {}
+def _gyro(
+    holds: Due, result: Calibration | None, document: Document, *, alarms: int, study: Studied | None
+) -> FleetGyro:
     found = verdicts.summary(result) if result else None
     views = found.parameters if found else {}
     interval = document.get("interval") or {}

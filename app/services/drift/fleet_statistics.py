@@ -29,6 +29,9 @@ _LEVEL: Final = 0.95
 _KNOWN: Final = ("within-position", "between-positions")
 """They are not estimated from session to session, but known from within each."""
 
+_LEAST_CHI2: Final = 1e-6
+"""A quantile below it: the variance is hardly known, and χ² says nothing; the interval is then that of its u."""
+
 _Key = Callable[[Standing], float | None]
 
 
@@ -125,8 +128,10 @@ def _interval(variance: float, u: float) -> tuple[float | None, float | None]:
     if not variance > 0.0 or not u > 0.0:
         return None, None
     dof, tail = 2.0 * variance**2 / u**2, (1.0 - _LEVEL) / 2.0
-    low, high = (sqrt(dof * variance / float(special.chdtri(dof, p))) for p in (tail, 1.0 - tail))
-    return low, high
+    ends = [float(special.chdtri(dof, p)) for p in (tail, 1.0 - tail)]
+    if not min(ends) > _LEAST_CHI2:
+        return 0.0, sqrt(variance + u * float(special.ndtri(0.5 + _LEVEL / 2.0)))
+    return sqrt(dof * variance / ends[0]), sqrt(dof * variance / ends[1])
 
 
 def _joined(rows: Sequence[Mapping[str, Any]]) -> float | None:

@@ -70,6 +70,8 @@ class StandDrift:
         Of the study; None before the first one.
     by
         What a point stands for, as it was asked for or as it had to be for at most `MOST_POINTS` points.
+    together
+        The same sessions by the month at least: what gyros have in common shows in means of several.
     affected_since, affected
         The last change of the stand that no event explains, and every session from it on, the newest first.
     """
@@ -83,6 +85,7 @@ class StandDrift:
     document: dict[str, Any] | None
     by: str
     points: tuple[StandPoint, ...]
+    together: tuple[StandPoint, ...]
     events: tuple[EventView, ...]
     alarms: tuple[AlarmView, ...]
     affected_since: datetime | None
@@ -122,6 +125,7 @@ def stand_drift(
         studied_at=row.studied_at if row else None, job=job_view(job) if job else None,
         sessions=0 if table is None else len(table), document=document, by=grouping,
         points=() if shown is None else tuple(_point(shown, members) for members in groups),
+        together=() if shown is None else tuple(_point(shown, members) for members in _together(shown, grouping)),
         events=events.of_stand(work, name), alarms=alarms.alarms(work, stand=name), affected_since=since_change,
         affected=() if table is None or since_change is None else tuple(_since(table, since_change)),
     )  # fmt: skip
@@ -145,6 +149,10 @@ def _grouped(table: SeriesTable, by: str | None) -> tuple[str, list[NDArray[np.i
             break
     cuts = np.flatnonzero(keys[1:] != keys[:-1]) + 1
     return name, np.split(np.arange(len(table)), cuts)[-MOST_POINTS:] if len(table) else []
+
+
+def _together(table: SeriesTable, by: str) -> list[NDArray[np.int64]]:
+    return _grouped(table, "year" if by == "year" else "month")[1]
 
 
 def _point(table: SeriesTable, members: NDArray[np.int64]) -> StandPoint:
