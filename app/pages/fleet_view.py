@@ -115,10 +115,10 @@ SORTS: Final[dict[str, _Key]] = {
     "status": lambda gyro, _item: -_VERDICTS.index(gyro.verdict),
     "due": lambda gyro, _item: (-STATES.index(gyro.due.state), -(gyro.due.days or 0)),
     "alarms": lambda gyro, _item: gyro.alarms,
-    "value": lambda _gyro, item: _known(item and item.value.value),
-    "standing": lambda _gyro, item: _known(item and item.standing),
-    "drift": lambda _gyro, item: _known(item and item.slope and abs(item.slope)),
-    "scatter": lambda _gyro, item: _known(item and item.scatter),
+    "value": lambda _gyro, item: _known(item.value.value if item else None),
+    "standing": lambda _gyro, item: _known(item.standing if item else None),
+    "drift": lambda _gyro, item: _known(abs(item.slope) if item and item.slope is not None else None),
+    "scatter": lambda _gyro, item: _known(item.scatter if item else None),
     "interval": lambda gyro, _item: -_known(gyro.recommended_days, float("inf")),
 }
 """By what the gyros can be sorted; descending puts the worst first."""

@@ -37,8 +37,8 @@ def page(
         panels=list(stand_drift_view.panels(found)) if shown else [],
         common=stand_drift_view.common(found, parameter) if shown else None, rows=stand_drift_view.rows(found),
         groups=stand_reading.GROUPS, drift=drift_labels, whole=since is None and until is None,
-        may_write="upload" in person.scopes, shown=_AFFECTED_SHOWN, size=stand_drift_words.size,
-        between=stand_drift_words.between,
+        may_write="upload" in person.scopes, shown=_AFFECTED_SHOWN, most=stand_reading.MOST_POINTS,
+        size=stand_drift_words.size, between=stand_drift_words.between,
     )  # fmt: skip
 
 

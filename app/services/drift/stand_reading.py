@@ -116,7 +116,7 @@ def stand_drift(
     row = drift.study(work.db, None, stand.id, following.STAND_METHOD)
     table = None if row is None or row.series is None else series.decode(row.series)
     document = None if row is None or row.document is None else json.loads(row.document)
-    shown = None if table is None else table.between(since, until)
+    shown = None if table is None else _coded(table.between(since, until))
     grouping, groups = (by or "session", []) if shown is None else _grouped(shown, by)
     job = None if row is None or row.job_id is None else results.job(work.db, row.job_id)
     since_change = _last_change(document)
@@ -135,6 +135,12 @@ def table_of(work: Work, name: str) -> SeriesTable | None:
     """Every session on a stand with what it shows; None before a study."""
     row = drift.study(work.db, None, find_stand(work, name).id, following.STAND_METHOD)
     return None if row is None or row.series is None else series.decode(row.series)
+
+
+def _coded(table: SeriesTable) -> SeriesTable:
+    """With gyros as numbers too, which are counted faster than texts."""
+    _, codes = np.unique(table["gyro"].astype(str), return_inverse=True)
+    return table.with_columns({"gyro_code": codes.ravel()})
 
 
 def _grouped(table: SeriesTable, by: str | None) -> tuple[str, list[NDArray[np.int64]]]:
@@ -157,12 +163,12 @@ def _together(table: SeriesTable, by: str) -> list[NDArray[np.int64]]:
 
 def _point(table: SeriesTable, members: NDArray[np.int64]) -> StandPoint:
     last = int(members[-1])
-    gyro = table["gyro"][members]
+    gyro = table["gyro_code"][members]
     found = {axis: _mean(table, axis, members) for axis in AXES}
     common = {name: _common(table[f"z.{name}"][members], gyro) for name in PARAMETERS}
     return StandPoint(
         at=aware(table["measured_at"][members[0]]), until=aware(table["measured_at"][last]),
-        sessions=len(members), gyros=len(set(gyro.tolist())), session=int(table["session"][last]),
+        sessions=len(members), gyros=len(np.unique(gyro)), session=int(table["session"][last]),
         calibration=int(table["calibration"][last]), gyro=str(table["gyro"][last]),
         certificate=str(table["certificate"][last]),
         values={axis: item[0] for axis, item in found.items()}, u={axis: item[1] for axis, item in found.items()},
@@ -185,8 +191,8 @@ def _common(z: NDArray[np.float64], gyro: NDArray[Any]) -> tuple[float | None, f
     known = np.isfinite(z)
     if not known.any():
         return None, None
-    _, which = np.unique(gyro[known].astype(str), return_inverse=True)
-    means = np.bincount(which.ravel(), z[known]) / np.bincount(which.ravel())
+    counts = np.bincount(gyro[known])
+    means = (np.bincount(gyro[known], z[known]) / np.maximum(counts, 1))[counts > 0]
     return float(means.mean()), float(LIMIT / np.sqrt(len(means)))
 
 

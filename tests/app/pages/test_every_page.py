@@ -18,12 +18,16 @@ READABLE = [
     "/", "/gyros", "/types/GVK-6", "/stands", "/stands/S1", "/stands/S1/uncertainty", "/certificates",
     "/stands/S1/plan", "/stands/S1/plan?mode=propose", "/stands/S1/plan?view=counts", "/stands/S1/plan?view=trade",
     "/certificates/S1/C-17", "/method", "/validation", "/sessions", "/results", "/gyros/0417",
+    "/gyros/0417/drift/w0x", "/gyros/0417/baseline", "/alarms", "/alarms?state=all",
+    "/types/GVK-6/fleet", "/stands/S1/drift", "/compare", "/compare?a=gyro:0417",
     "/loop", "/loop?start=printed",
 ]  # fmt: skip
 WRITABLE = [
     "/sessions/new",
     "/gyros/new",
     "/gyros/0417/edit",
+    "/gyros/0417/events/new",
+    "/stands/S1/events/new",
     "/stands/new",
     "/certificates/new",
     "/simulations/new",
@@ -31,6 +35,8 @@ WRITABLE = [
 POSTED = [
     "/gyros/new",
     "/gyros/0417/edit",
+    "/gyros/0417/events/new",
+    "/stands/S1/events/new",
     "/types/GVK-6",
     "/stands/new",
     "/stands/S1/uncertainty",
