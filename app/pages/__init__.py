@@ -2,7 +2,8 @@
 
 Addresses: ``/`` today · ``/sessions`` ``/sessions/new`` ``/sessions/{id}`` ``/sessions/{id}/live`` · ``/results``
 ``/results/{id}`` · ``/measurements/{id}`` · ``/gyros`` ``/gyros/{serial}`` (its history)
-``/gyros/{serial}/edit`` · ``/types/{name}`` · ``/stands`` ``/stands/{name}``
+``/gyros/{serial}/edit`` ``/gyros/{serial}/drift/{parameter}`` ``/gyros/{serial}/baseline``
+``/gyros/{serial}/events/new`` · ``/alarms`` ``/alarms/{id}`` · ``/types/{name}`` · ``/stands`` ``/stands/{name}``
 ``/stands/{name}/plan`` ``/stands/{name}/uncertainty`` · ``/certificates``
 ``/certificates/{stand}/{number}`` · ``/simulations/new`` · ``/jobs/{id}`` · ``/method`` ·
 ``/loop`` · ``/validation`` ``/validation/{report}``.

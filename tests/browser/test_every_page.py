@@ -7,7 +7,8 @@ pytestmark = pytest.mark.browser
 PAGES = [
     "/", "/sessions", "/sessions?gyro=0417", "/sessions/79", "/sessions/79/entry", "/sessions/78",
     "/sessions/new", "/results", "/results/78", "/results/76", "/gyros", "/gyros/new", "/gyros/0417",
-    "/gyros/0423", "/gyros/0417/edit", "/types/GVK-6", "/stands", "/stands/S1", "/stands/S1/uncertainty", "/stands/new",
+    "/gyros/0423", "/gyros/0417/edit", "/gyros/0417/drift/w0y", "/gyros/0417/baseline", "/gyros/0417/events/new",
+    "/alarms", "/types/GVK-6", "/stands", "/stands/S1", "/stands/S1/uncertainty", "/stands/new",
     "/stands/S1/plan?nominal=type:GVK-6", "/stands/S1/plan?mode=propose&grid_deg=45", "/stands/S1/plan?view=trade",
     "/certificates", "/certificates/S1/C-17", "/certificates/new", "/simulations/new", "/method", "/validation",
     "/loop", "/loop?start=printed",
