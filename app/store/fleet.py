@@ -103,7 +103,9 @@ def studies_of(db: Session, gyro_ids: Sequence[int], method: str) -> Sequence[St
             DriftStudy.gyro_id.in_(gyro_ids), DriftStudy.method == method
         )
     )
-    return [Studied(gyro_id, document, bool(fresh)) for gyro_id, document, fresh in rows]
+    return [
+        Studied(gyro_id, document, bool(fresh)) for gyro_id, document, fresh in rows if gyro_id is not None
+    ]
 
 
 def open_alarms(db: Session, gyro_ids: Sequence[int], method: str) -> Mapping[int, int]:
@@ -113,7 +115,7 @@ def open_alarms(db: Session, gyro_ids: Sequence[int], method: str) -> Mapping[in
         .where(Alarm.gyro_id.in_(gyro_ids), Alarm.method == method, Alarm.state == "open")
         .group_by(Alarm.gyro_id)
     )
-    return {row[0]: row[1] for row in rows}
+    return {gyro_id: count for gyro_id, count in rows if gyro_id is not None}
 
 
 def results_of(db: Session, calibration_ids: Sequence[int]) -> Mapping[int, Calibration]:
