@@ -129,7 +129,7 @@ def demonstration_fleet(seed: int) -> tuple[FleetGyro, ...]:
         FleetGyro("0412", *_born(GVK_6, seed, 0)),
         FleetGyro(
             "0417", *_born(GVK_6, seed, 1),
-            drift={"w0x": dph(0.6) / YEAR, "wg": dph(0.4) / YEAR, "wk": dph(0.17) / YEAR},
+            drift={"w0x": dph(0.6) / YEAR, "wg": dph(0.4) / YEAR, "wk": dph(0.25) / YEAR},
         ),
         FleetGyro(REPAIRED[0], *_born(GVK_6, seed, 2), jumps=(repair,)),
         FleetGyro("0423", *_born(GVK_6, seed, 3), jumps=(jump,)),

@@ -37,6 +37,7 @@ class Selection:
     gyro: str = ""
     stand: str = ""
     type_name: Annotated[str, Query(alias="type")] = ""
+    method: str = ""
 
 
 Selected = Annotated[Selection, Depends()]
@@ -55,6 +56,7 @@ _FACETS: Final[Mapping[str, Callable[[Queued], str]]] = {
     "kind": lambda item: item.alarm.kind,
     "stand": lambda item: item.stand,
     "type_name": lambda item: item.type,
+    "method": lambda item: item.alarm.method,
 }
 
 

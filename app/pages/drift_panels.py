@@ -93,7 +93,7 @@ def chart(
         (window.begin, window.end),
         _description(found, item),
         stretches=stretches(item, found.baselines, window, "individuals"),
-        changes=list(_steps(study, item, window)),
+        changes=_steps(study, item, window),
         forecast=_forecast(study, window),
         today=_today(window, named=named),
         with_dates=with_dates,
@@ -213,14 +213,26 @@ def _stretch(points: Sequence[DriftPoint], name: str, begin: datetime, end: date
     return plots.ControlStretch(points[-1].charts.get(f"{name}_centre") or 0.0, steps, end)
 
 
-def _steps(study: Mapping[str, Any], item: ParameterDrift, window: Window) -> Iterator[plots.DriftChange]:
-    """Steps that no event explains: each lies between two sessions."""
-    for change in study.get("changes", ()):
-        before, at = drift_words.moment(change["before"]), drift_words.moment(change["at"])
-        if change["kind"] != "step" or explained(change) or before is None or at is None:
+def _steps(study: Mapping[str, Any], item: ParameterDrift, window: Window) -> list[plots.DriftChange]:
+    """Steps that no event explains, each between two sessions; the surer one is named where names would collide."""
+    length = (window.end - window.begin) / timedelta(days=1)
+    found = [
+        change
+        for change in study.get("changes", ())
+        if change["kind"] == "step" and not explained(change)
+    ]  # fmt: skip
+    made: list[plots.DriftChange] = []
+    taken: list[tuple[float, float]] = []
+    for change in sorted(found, key=lambda change: change["p_value"] or 0.0):
+        before, at = datetime.fromisoformat(change["before"]), datetime.fromisoformat(change["at"])
+        if not window.begin <= at <= window.end:
             continue
-        if window.begin <= at <= window.end:
-            yield plots.DriftChange(max(before, window.begin), at, drift_words.change(change, item.unit))
+        begin, text = max(before, window.begin), drift_words.size(change)
+        span = _span(begin, text, window, length)
+        free = all(span[1] < other[0] or other[1] < span[0] for other in taken)
+        taken += [span] if free else []
+        made.append(plots.DriftChange(begin, at, text if free else ""))
+    return made
 
 
 def explained(change: Mapping[str, Any]) -> bool:

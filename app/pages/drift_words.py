@@ -129,6 +129,11 @@ def change(found: Entry, unit: str) -> str:
     return f"{text} ± {expanded} {labels.unit(unit)}"
 
 
+def size(found: Entry) -> str:
+    """A step where there is room for its size only: ``+0.0224``."""
+    return _signed(found["size"], found.get("u"))[0]
+
+
 def probability(value: float | None) -> str:
     """A probability of a test: ``0.032``, ``< 0.001``."""
     if value is None:

@@ -1,5 +1,6 @@
 """The first screen: the stand now with its one next action, and the latest sessions."""
 
+from collections.abc import Sequence
 from datetime import UTC, datetime
 
 from fastapi import APIRouter, Request, Response
@@ -11,11 +12,12 @@ from app.pages.live_map import Numbers
 from app.pages.positions import last_measured, next_position, position_map
 from app.services import gyros, overview, stands
 from app.services.drift import alarms
+from app.services.drift.views import AlarmView
 
 router = APIRouter()
 
-_ALARMS = 4
-"""Shown on the first screen; the queue has the others."""
+_ALARMS = 5
+"""Gyros and stands with alarms that the first screen shows; the queue has the others."""
 
 
 @router.get("/")
@@ -25,7 +27,7 @@ def today(request: Request, person: Reader, lab: TheLab) -> Response:
         seen = overview.overview(work)
         has_gyro = bool(gyros.gyros(work, limit=1).items)
         known = stands.stands(work)
-        worst, counts = alarms.alarms(work, limit=_ALARMS), alarms.counts(work)
+        worst, counts = _worst(alarms.alarms(work)), alarms.counts(work)
     current = seen.current
     run = current.session.station if current else None
     watched = (
@@ -41,3 +43,11 @@ def today(request: Request, person: Reader, lab: TheLab) -> Response:
         worst=worst, open_count=sum(counts.values()), drift=drift_labels, words=drift_words,
         has_gyro=has_gyro, has_stand=bool(known), certified=any(item.certificate for item in known),
     )  # fmt: skip
+
+
+def _worst(found: Sequence[AlarmView]) -> list[AlarmView]:
+    """The worst alarm of each gyro and stand, the worst of these first."""
+    first: dict[tuple[str | None, str | None], AlarmView] = {}
+    for alarm in found:
+        first.setdefault((alarm.gyro, alarm.stand), alarm)
+    return list(first.values())[:_ALARMS]

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Final
 
 from app.exchange.json_values import dumps
 from app.services.drift import baselines, events, series, study
@@ -11,6 +11,8 @@ from app.store import equipment
 from solver import __version__
 
 Report = Callable[[float, str], None]
+_MAIN: Final = "least-squares"
+"""The method whose study raises alarms; another one's only where this has no result: one finding, one alarm."""
 
 
 def prepare(work: Work, gyro_id: int) -> dict[str, Any]:
@@ -40,6 +42,7 @@ def studied(payload: Mapping[str, Any], report: Report) -> dict[str, Any]:
         ``findings`` (as `alarms.Finding`), ``counting`` (ids of the results that count).
     """
     made = {}
+    heard = _MAIN if _MAIN in payload["series"] else next(iter(payload["series"]), None)
     for number, (method, content) in enumerate(payload["series"].items()):
         report(number / len(payload["series"]), "studying")
         known = study.Known(
@@ -49,7 +52,7 @@ def studied(payload: Mapping[str, Any], report: Report) -> dict[str, Any]:
         found = study.study(series.decode(content), known)
         made[method] = {
             "document": dumps(found.document), "series": series.encode(found.table),
-            "solver_version": __version__, "findings": [asdict(item) for item in found.findings],
+            "solver_version": __version__, "findings": [asdict(item) for item in found.findings if method == heard],
             "counting": found.table["calibration"].tolist(),
         }  # fmt: skip
     return made

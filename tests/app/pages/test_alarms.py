@@ -121,7 +121,7 @@ def test_gyros_that_are_due_stand_below(technician: TestClient, lab: Lab) -> Non
 
 def test_from_the_first_screen_to_the_drifting_gyro_in_two_clicks(technician: TestClient) -> None:
     today = technician.get("/").text
-    assert "2 open alarms, the worst first" in text(today)
+    assert "2 open alarms, the worst of each gyro or stand" in text(today)
     link = re.search(r'href="(/gyros/0417\?period=all&amp;method=least-squares#alarm-1)"', today)
     assert link
     assert 'id="alarm-1"' in technician.get(html.unescape(link[1])).text
