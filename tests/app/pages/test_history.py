@@ -184,6 +184,29 @@ def test_events_can_be_withdrawn_and_derived_ones_cannot(technician: TestClient,
     assert page.count("/withdrawal") == 1
 
 
+def test_a_step_that_no_event_explains_is_dated_and_named_by_its_size(
+    technician: TestClient, lab: Lab, results: list[int]
+) -> None:
+    """Of two steps whose names would run into each other the surer one is named."""
+    with lab.write(access.SYSTEM) as work:
+        gyro = equipment.gyro(work.db, "0417")
+        assert gyro is not None
+        row = drift.study(work.db, gyro.id, None, "least-squares")
+        assert row is not None
+        document = json.loads(row.document or "")
+        step = document["parameters"]["w0x"]["changes"][0] | {"event": None}
+        doubtful = step | {"size": 0.001, "p_value": 0.03}
+        document["parameters"]["w0x"]["changes"] = [doubtful, step]
+        row.document = json.dumps(document)
+    first, second, *_ = charts(technician.get("/gyros/0417?period=all").text)
+    bands = first["datasets"]["changes"]
+    assert [band["text"] for band in bands] == ["+0.0224", ""]
+    moments = [row["t"] for row in first["datasets"]["line"]]
+    before, after = drift_laboratory.BEFORE - 1, drift_laboratory.BEFORE
+    assert (bands[0]["t"], bands[0]["t2"]) == (moments[before], moments[after])
+    assert second["datasets"]["changes"] == []
+
+
 def test_the_basis_of_the_limits_is_said(technician: TestClient, results: list[int]) -> None:
     text = section(technician.get("/gyros/0417").text, "charts")
     assert "All parameters: individuals chart from" in text
