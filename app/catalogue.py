@@ -5,6 +5,7 @@ templates of `problem`, `refuse` and `Message`) and brings it into each ``driftb
 prints what is still to be translated. The command line and the machine interface speak English.
 """
 
+import os
 import sys
 from collections.abc import Iterable, Iterator
 from datetime import UTC, datetime
@@ -86,7 +87,7 @@ def refresh(language: str) -> Catalog:
         False,
     )
     kept.revision_date = kept.creation_date
-    unfinished = po_file(language).with_suffix(".part")
+    unfinished = po_file(language).with_suffix(f".{os.getpid()}.part")  # two may do this at once
     with unfinished.open("wb") as file:
         write_po(
             file,

@@ -248,7 +248,7 @@ def _own(starts: Starts, belief: Belief) -> list[Finding]:
             continue
         places = np.arange(1, len(mine.time))
         cut = split(mine, places, belief)
-        told = odds(cut.own, log_date_odds(mine.time, belief.gyro_changes)[None])
+        told = odds(cut.worth, log_date_odds(mine.time, belief.gyro_changes)[None])
         if told.log < belief.log_odds:
             continue
         at = int(np.argmax(told.dates))

@@ -111,6 +111,8 @@ def tempered(gain: Array, dof: float) -> Array:
     The logarithm of a ratio of Student's densities, ν/2·log(1 + χ²/ν): a scatter known from few starts may be
     several times as large, and then large differences are nothing unusual.
     """
+    if not np.isfinite(dof):
+        return gain
     return np.asarray(dof / 2.0 * np.log1p(2.0 * np.maximum(gain, 0.0) / dof) + np.minimum(gain, 0.0))
 
 

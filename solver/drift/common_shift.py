@@ -46,7 +46,9 @@ class Splits:
     score : (G, K, 8) array
         q_g.
     own : (G, K) array
-        Logarithm of C_g.
+        Logarithm of C_g, as if V were exact: it competes with likelihood ratios that are formed so.
+    worth : (G, K) array
+        The same for a V known with so many degrees of freedom.
     gyros : (G,) int array
         Labels.
     dof : float
@@ -56,6 +58,7 @@ class Splits:
     information: Array
     score: Array
     own: Array
+    worth: Array
     gyros: Whole
     dof: float
 
@@ -76,13 +79,9 @@ def split(starts: Starts, dates: Whole, belief: Belief) -> Splits:
         difference = share @ sums
         information[row] = ((difference + difference.swapaxes(-1, -2)) / 2)[after]
         score[row] = (pulls[-1] - pulls - np.einsum("mij,j->mi", share, pulls[-1]))[after]
-    return Splits(
-        information,
-        score,
-        own_change(information, score, belief.gyro_change_size, starts.dof),
-        gyros,
-        starts.dof,
-    )
+    size = belief.gyro_change_size
+    own, worth = (own_change(information, score, size, dof) for dof in (np.inf, starts.dof))
+    return Splits(information, score, own, worth, gyros, starts.dof)
 
 
 def own_change(information: Array, score: Array, size: float, dof: float) -> Array:

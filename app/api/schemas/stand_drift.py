@@ -28,8 +28,8 @@ class StandPoint(Outgoing):
     """Sessions taken together; `session`, `calibration`, `gyro` and `certificate` are of the last one.
 
     `values` and `u`: azimuth, level_north and level_east of the base in arcsec against the certificate (level_east
-    against its gyros' means). `common`: by parameter the mean of its gyros' deviations from their own courses in standard
-    deviations of one; between ± `limits` while they do nothing together.
+    against its gyros' means). `common`: by parameter the mean of its gyros' deviations from their own courses in
+    standard deviations of one; between ± `limits` while they do nothing together.
     """
 
     at: datetime
@@ -61,7 +61,8 @@ class StandDrift(Outgoing):
     `document` holds what was found: `findings`, each with its `verdict` (stand, certificate, gyro, unclear, none), its
     `direction` (azimuth, level-north, level-east, certificate, own), the days between which it happened, its size
     in arcsec and its probability; and `detectable`, the smallest turns that these sessions reveal. Null before the
-    first study. `affected` are the sessions since the last change of the stand that no event explains, the newest first.
+    first study. `affected` are the sessions since the last change of the stand that no event explains, the newest
+    first.
     """
 
     stand: str
