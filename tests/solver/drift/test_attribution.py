@@ -69,7 +69,7 @@ def test_a_gyros_own_change_is_never_the_stands(seed):
     """Sixty of them at 2 % would give 1.2; here none of 40 is."""
     laboratory = with_changing_gyros(draw_laboratory(100 + seed), np.random.default_rng(seed))
     findings = [finding for history in stand_histories(laboratory) for finding in attribute(history)]
-    assert "stand" not in {finding.verdict for finding in findings}
+    assert {"stand", "unclear"}.isdisjoint(finding.verdict for finding in findings)
     own = {finding.gyro for finding in findings if finding.verdict == "gyro"}
     # Those of 5 scatters and more, half of them, are clear.
     assert len(own) >= 8

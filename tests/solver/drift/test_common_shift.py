@@ -78,6 +78,13 @@ def test_one_gyro_that_changes_lends_the_stand_nothing(own, rng):
     assert cut.own[0].max() > 10
 
 
+def test_a_jump_of_thirty_scatters_is_nobody_elses_where_few_starts_are_known(rng):
+    """With few degrees of freedom the jump's own evidence is worth less; not so against the stand's."""
+    cut, seen = judged(drawn(rng, own=np.eye(8)[6] * 60, gyros=3, each=10, at=5), np.arange(1, 30))
+    assert (cut.worth[0] < cut.own[0]).any()
+    assert seen.log_evidence.max() < 2.0
+
+
 def test_one_gyro_that_changes_does_not_hide_a_shared_shift(rng):
     _, seen = judged(drawn(rng, turn=0.5, own=np.eye(8)[4] * 30), [140])
     assert abs(seen.value[0, 0] - 0.5) < 4 * np.sqrt(seen.covariance[0, 0, 0])
