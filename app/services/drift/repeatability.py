@@ -3,6 +3,7 @@
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.exchange.json_values import Json
 from app.services.drift.series import SeriesTable, seconds
@@ -28,12 +29,13 @@ def repeatability(table: SeriesTable, parameter: str, course: Course, limit: flo
     empty: Json = {
         "components": [], "together": None, "repeatability_limit": limit, "repeatability_verdict": "no-limit",
     }  # fmt: skip
-    design = _explained(seconds(table["measured_at"][places]), course)[kept]
+    day = table["start_at"].astype("datetime64[D]")
+    design = _explained(_together(seconds(table["measured_at"]), day)[places], course)[kept]
     if len(here) < FEWEST + design.shape[1]:
         return empty
     found = nested_components(
         here[f"{parameter}.value"],
-        {"between-days": here["start_at"].astype("datetime64[D]"), "between-starts": here["start"]},
+        {"between-days": day[places][kept], "between-starts": here["start"]},
         _within(here, parameter),
         design=design,
     )
@@ -52,6 +54,15 @@ def _within(table: SeriesTable, parameter: str) -> Within | None:
     chi2, dof = table["chi2"], table["fit_dof"]
     fitted = np.isfinite(chi2) & np.isfinite(dof) & (dof > 0)
     return Within(noise, chi2, dof) if fitted.all() else Within(noise)
+
+
+def _together(time: Array, day: NDArray[np.datetime64]) -> Array:
+    """The mean time of each day's sessions, (n,): what drifts within hours counts as scatter.
+
+    A trend over the hours of one day would take the only degree of freedom that tells two sessions of a day apart.
+    """
+    groups = np.unique(day, return_inverse=True)[1]
+    return np.asarray((np.bincount(groups, time) / np.bincount(groups))[groups])
 
 
 def _explained(time: Array, course: Course) -> Array:

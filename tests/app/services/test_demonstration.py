@@ -95,6 +95,8 @@ def test_the_courses_are_those_of_the_simulated_gyros(built):
     drifting, ageing = studies["0417"]["w0x"]["trend"], studies["D-031"]["w0y"]["trend"]
     # 4 standard uncertainties: a chance of 6e-5, of a slope of 0.6 °/h a year and a time constant of 60 days.
     assert drifting["model"] == "linear"
+    # Removing the drift leaves what two sessions and two starts of one day tell of their scatter.
+    assert all(part["sd"] is not None for part in studies["0417"]["w0x"]["components"])
     assert abs(drifting["slope_per_year"] - 0.6) < 4 * drifting["u_slope_per_year"]
     assert ageing["model"] == "exponential"
     assert 30 < ageing["time_constant_days"] < 120
