@@ -190,6 +190,8 @@ def document(table: series.SeriesTable, now: datetime) -> dict[str, Any]:
         "parameters": parameters, "due": (now + timedelta(days=88)).isoformat(),
         "interval": {
             "stated_days": 92, "recommended_days": 61.4,
+            "reason": {"template": "%(days)d days: the shortest advice is the control chart's, %(wanted)d days.",
+                       "values": {"days": 61, "wanted": 61}},
             "methods": [{"method": "staircase", "days": 92.0, "reason": None},
                         {"method": "control-chart", "days": 61.4, "reason": {
                             "template": "The course leaves its limits after %(days)d days.", "values": {"days": 61}}}],
