@@ -20,7 +20,7 @@ from app.services import gyros
 from app.services.drift import baselines, previewing, reading
 from app.services.drift.views import DriftPoint, ProposedBaseline
 from app.services.lab import Lab, Person, Work
-from solver.drift.run_rules import RULES
+from solver.drift.control.run_rules import RULES
 
 router = APIRouter()
 

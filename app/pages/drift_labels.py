@@ -12,8 +12,8 @@ from app.pages import labels
 from app.pages.labels import Mark
 from app.services.drift.due import Due
 from app.services.drift.views import EventView
-from solver.drift.false_alarms import Chances
-from solver.drift.run_rules import RULES
+from solver.drift.control.false_alarms import Chances
+from solver.drift.control.run_rules import RULES
 
 ALARM_KINDS: Final = {
     "out-of-limits": Mark("out", marked("Out of limits")),

@@ -12,7 +12,7 @@ from app.i18n import gettext, translate
 from app.pages import drift_labels, labels
 from app.services.drift.views import AlarmView
 from app.services.views import COVERAGE_FACTOR
-from solver.drift.run_rules import RULES
+from solver.drift.control.run_rules import RULES
 
 _WEEKS_FROM: Final = 21
 _DAYS_A_MONTH: Final = 365.25 / 12

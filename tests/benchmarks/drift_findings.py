@@ -15,7 +15,7 @@ of these standard deviations.
 - gyro: every gyro changes by itself, a step of 1 to 30 scatters in one parameter or all, or a drift; how many of these
   are called the stand's, looking at the whole history. Early: looked at when the change is three months old.
 - nothing: stands on which nothing changes, looked at after every sixth session for five years; how many are
-  ever said to have moved, against the bound of `solver.drift.belief`.
+  ever said to have moved, against the bound of `solver.drift.stands.belief`.
 - detectable: turns of the computed size, in the middle of the history, that are found.
 - chart: values beyond 3 standard deviations of a baseline of the first 20, beside the stated rate.
 """
@@ -32,15 +32,15 @@ import numpy as np
 
 from simdevice.fleet import YEAR, Jump
 from simdevice.laboratory_life import LaboratoryLife, Move, draw_laboratory
-from solver.drift.attribution import StandHistory, attribute
-from solver.drift.baseline import freeze
-from solver.drift.belief import Belief
-from solver.drift.charts import individuals
-from solver.drift.course import describe
-from solver.drift.detectability import detectable
-from solver.drift.false_alarms import expected
-from solver.drift.forecast import predict
+from solver.drift.control.baseline import freeze
+from solver.drift.control.charts import individuals
+from solver.drift.control.false_alarms import expected
+from solver.drift.courses.course import describe
+from solver.drift.courses.forecast import predict
 from solver.drift.history import History
+from solver.drift.stands.attribution import StandHistory, attribute
+from solver.drift.stands.belief import Belief
+from solver.drift.stands.detectability import detectable
 from solver.units import rad_per_s_from_deg_per_h
 from tests.solver.drift.laboratories import ARCMIN, stand_histories, with_changing_gyros
 

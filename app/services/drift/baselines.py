@@ -21,7 +21,7 @@ from app.services.finding import find_gyro
 from app.services.lab import Work
 from app.store import drift
 from app.store.tables import Baseline
-from solver.drift import baseline as frozen
+from solver.drift.control import baseline as frozen
 from solver.errors import SolverError
 from solver.records import PARAMETERS
 

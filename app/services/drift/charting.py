@@ -16,10 +16,10 @@ from app.errors import Invalid, problem
 from app.exchange.json_values import Json
 from app.services.drift.series import Column, SeriesTable, moment
 from app.services.drift.views import BaselineView, EventView
-from solver.drift.baseline import WIDTH, Baseline, Estimator, Limits
-from solver.drift.charts import WEIGHT, ewma, individuals
-from solver.drift.cusum import ALLOWANCE, DECISION, cusum
-from solver.drift.run_rules import RULES
+from solver.drift.control.baseline import WIDTH, Baseline, Estimator, Limits
+from solver.drift.control.charts import WEIGHT, ewma, individuals
+from solver.drift.control.cusum import ALLOWANCE, DECISION, cusum
+from solver.drift.control.run_rules import RULES
 
 CHARTS: Final = (
     "individuals", "individuals_centre", "individuals_low", "individuals_high", "moving_range", "moving_range_centre",

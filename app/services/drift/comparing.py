@@ -23,8 +23,8 @@ from app.services.lab import Work
 from app.services.views import ParameterView
 from app.store import fleet, results
 from app.store.tables import Calibration
-from solver.drift import comparison
-from solver.drift.comparison import Difference
+from solver.drift.comparing import comparison
+from solver.drift.comparing.comparison import Difference
 from solver.estimators.model_comparison import holm
 from solver.records import PARAMETERS
 

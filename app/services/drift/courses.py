@@ -10,9 +10,9 @@ import numpy as np
 from app.exchange.json_values import Json, finite
 from app.services.drift.series import Column, SeriesTable, aware, iso, moment
 from app.services.drift.views import EventView
-from solver.drift.course import describe
-from solver.drift.course_records import Change, Course
-from solver.drift.forecast import PROBABILITY, Leaving, leaves, predict
+from solver.drift.courses.course import describe
+from solver.drift.courses.course_records import Change, Course
+from solver.drift.courses.forecast import PROBABILITY, Leaving, leaves, predict
 from solver.records import Array
 
 DAY: Final = 86_400.0

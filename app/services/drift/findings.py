@@ -19,7 +19,7 @@ from app.services.drift.alarms import Finding
 from app.services.drift.charting import Signal
 from app.services.drift.series import SeriesTable, iso, moment
 from app.services.verdicts import judge
-from solver.drift.run_rules import RULES
+from solver.drift.control.run_rules import RULES
 from solver.errors import Message
 
 GAP: Final = 3

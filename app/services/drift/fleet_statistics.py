@@ -17,7 +17,7 @@ from scipy import special
 
 from app.exchange.si import PARAMETER_UNITS
 from app.services.drift.fleet_views import Correlated, Distribution, FleetGyro, Pooled, Standing
-from solver.drift import correlation, distribution
+from solver.drift.comparing import correlation, distribution
 from solver.records import PARAMETERS
 
 FEWEST_FOR_QUARTILES: Final = 4

@@ -13,9 +13,9 @@ from app.exchange.json_values import Json
 from app.exchange.si import PARAMETER_UNITS
 from app.services.drift.courses import DAY, HORIZON
 from app.services.drift.series import Column, SeriesTable, seconds
-from solver.drift.in_use import Use
-from solver.drift.interval_evidence import Check, Evidence, Findings, Outlook
-from solver.drift.recalibration import MethodAdvice, recommend
+from solver.drift.recalibrating.in_use import Use
+from solver.drift.recalibrating.interval_evidence import Check, Evidence, Findings, Outlook
+from solver.drift.recalibrating.recalibration import MethodAdvice, recommend
 from solver.errors import Message
 from solver.records import Array
 

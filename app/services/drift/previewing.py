@@ -12,9 +12,9 @@ from app.services.drift.series import SeriesTable
 from app.services.drift.views import BaselineView
 from app.services.finding import find_gyro
 from app.services.lab import Work
-from solver.drift import false_alarms
-from solver.drift.baseline import Baseline, Estimator, Limits
-from solver.drift.false_alarms import Chances
+from solver.drift.control import false_alarms
+from solver.drift.control.baseline import Baseline, Estimator, Limits
+from solver.drift.control.false_alarms import Chances
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from app.exchange.json_values import Json
 from app.services.drift.series import SeriesTable, seconds
-from solver.drift.components import Component, Within
-from solver.drift.course_records import Course
-from solver.drift.nested import nested_components
+from solver.drift.courses.course_records import Course
+from solver.drift.repeatability.components import Component, Within
+from solver.drift.repeatability.nested import nested_components
 from solver.records import Array
 
 FEWEST: Final = 3

@@ -9,7 +9,7 @@ from app.exchange.si import parameter_si
 from app.services.drift import series
 from app.services.drift.series import ATTITUDE, Column, SeriesTable, seconds
 from app.store.fleet import OnStand
-from solver.drift.attribution import StandHistory
+from solver.drift.stands.attribution import StandHistory
 from solver.records import PARAMETERS, Array
 from solver.units import rad_from_arcsec
 
@@ -49,7 +49,7 @@ def _part(gyro: OnStand, stand: str) -> dict[str, Column]:
 
 
 def history(table: SeriesTable) -> StandHistory:
-    """The same in SI with labels as numbers, for `solver.drift.attribution`."""
+    """The same in SI with labels as numbers, for `solver.drift.stands.attribution`."""
     arcsec = rad_from_arcsec(1.0)
     factors = np.array([parameter_si(name, 1.0) for name in PARAMETERS])
 

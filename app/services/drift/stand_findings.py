@@ -11,7 +11,7 @@ from app.exchange.si import PARAMETER_UNITS, parameter_lab
 from app.services.drift.alarms import Finding
 from app.services.drift.series import SeriesTable, aware, iso
 from app.services.drift.views import EventView
-from solver.drift import attribution
+from solver.drift.stands import attribution
 from solver.errors import Message
 from solver.records import PARAMETERS
 from solver.units import arcsec_from_rad

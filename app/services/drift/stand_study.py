@@ -2,7 +2,7 @@
 
 It is computed from the columns of the gyros' own studies by least squares (`stand_columns`): each session
 shows azimuth and level about north of the base in its residuals, its parameters show what the gyro did, and all gyros
-together what they share. `solver.drift.attribution` judges; here its findings get their days, and those that are
+together what they share. `solver.drift.stands.attribution` judges; here its findings get their days, and those that are
 the stand's, or may be, become alarms unless somebody entered an event that explains them.
 """
 
@@ -17,8 +17,8 @@ from app.services.drift.views import EventView
 from app.services.lab import Work
 from app.store import fleet
 from solver import __version__
-from solver.drift.attribution import attribute
-from solver.drift.detectability import detectable
+from solver.drift.stands.attribution import attribute
+from solver.drift.stands.detectability import detectable
 from solver.units import arcsec_from_rad
 
 METHOD: Final = following.STAND_METHOD

@@ -6,7 +6,7 @@ import numpy as np
 
 from simdevice.fleet import YEAR, Jump
 from simdevice.laboratory_life import LaboratoryLife
-from solver.drift.attribution import StandHistory
+from solver.drift.stands.attribution import StandHistory
 from solver.estimators.batch import Stand, solve_sessions
 from solver.estimators.stand_attitude import level_east_signature, turns_of_sessions
 

@@ -1,0 +1,1 @@
+"""Two results, or many gyros, compared: differences in units of U, distributions, correlations."""

@@ -1,0 +1,1 @@
+"""Control charts against a frozen baseline: what it is, charts, run rules, and how often they alarm falsely."""
