@@ -10,6 +10,7 @@ from typing import Final
 from urllib.parse import urlsplit
 
 import structlog
+from anyio import BrokenResourceError
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
@@ -210,10 +211,17 @@ class LastResort:
 
         try:
             await self._app(scope, receive, noted)
-        except ClientDisconnect:
-            return None  # nobody is left to be answered
         except Exception as error:
+            if _is_gone(error):
+                return None  # nobody is left to be answered
             if begun:  # half an answer: the connection has to break, so that nobody takes it for a whole one
                 raise
             answer = await self._answer(Request(scope, receive), error)
             await answer(scope, receive, send)
+
+
+def _is_gone(error: Exception) -> bool:
+    """Whether all that failed is that the client has gone; a stream's keep-alive meets its closed end."""
+    if isinstance(error, ExceptionGroup):
+        return all(_is_gone(part) for part in error.exceptions)
+    return isinstance(error, ClientDisconnect | BrokenResourceError)

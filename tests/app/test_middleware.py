@@ -4,6 +4,7 @@ from typing import Any
 
 import httpx
 import pytest
+from anyio import BrokenResourceError
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response, StreamingResponse
@@ -151,6 +152,25 @@ async def test_the_last_resort_answers_what_failed() -> None:
     with pytest.raises(RuntimeError):  # half an answer must not look like a whole one
         await ask(app, path="/midway")
     assert len(errors) == 1
+
+
+@pytest.mark.anyio
+async def test_a_client_that_has_gone_is_no_failure_but_a_failure_beside_it_is() -> None:
+    raised: list[Exception] = []
+
+    async def stream(_scope: Scope, _receive: Receive, send: Send) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        raise ExceptionGroup("of a stream's tasks", raised)
+
+    async def answer(_request: Request, _error: Exception) -> Response:
+        raise AssertionError("nobody is there to be answered")
+
+    app = LastResort(stream, answer)
+    raised[:] = [BrokenResourceError()]
+    assert (await ask(app)).status_code == 200
+    raised[:] = [BrokenResourceError(), RuntimeError("ours")]
+    with pytest.raises(ExceptionGroup):
+        await ask(app)
 
 
 @pytest.fixture
