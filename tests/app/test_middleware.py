@@ -9,7 +9,7 @@ from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.middleware import BodyLimit, LastResort, RequestLog, SameSite, SecurityHeaders
 
@@ -166,11 +166,20 @@ async def test_a_client_that_has_gone_is_no_failure_but_a_failure_beside_it_is()
         raise AssertionError("nobody is there to be answered")
 
     app = LastResort(stream, answer)
+
+    async def receive() -> Message:
+        return {"type": "http.disconnect"}
+
+    async def send(message: Message) -> None:
+        sent.append(message["type"])
+
+    sent: list[str] = []
     raised[:] = [BrokenResourceError()]
-    assert (await ask(app)).status_code == 200
+    await app({"type": "http"}, receive, send)
+    assert sent == ["http.response.start"], "no answer is added to half a one"
     raised[:] = [BrokenResourceError(), RuntimeError("ours")]
     with pytest.raises(ExceptionGroup):
-        await ask(app)
+        await app({"type": "http"}, receive, send)
 
 
 @pytest.fixture
