@@ -7,8 +7,8 @@ from typing import Final
 from app.errors import Conflict, Invalid, problem
 from app.services import verdicts
 from app.services.drift import following
-from app.services.finding import find_gyro
 from app.services.lab import Work
+from app.services.lookup import find_gyro
 from app.services.names import checked_name
 from app.services.views import GyroView, Nominal, Page, TypeView
 from app.store import equipment, results

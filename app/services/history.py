@@ -7,8 +7,8 @@ from app.errors import Invalid, problem
 from app.exchange.si import PARAMETER_UNITS
 from app.services.drift import series
 from app.services.drift.series import SeriesTable, aware
-from app.services.finding import find_gyro
 from app.services.lab import Work
+from app.services.lookup import find_gyro
 from app.services.verdicts import judge
 from app.services.views import HistoryPoint, HistorySeries
 from solver.records import PARAMETERS

@@ -7,10 +7,10 @@ from typing import Any, cast
 
 from app.errors import Invalid, NotFound, problem
 from app.services import gyros, stands, verdicts
-from app.services.finding import find_gyro
 from app.services.job_views import job_view
 from app.services.lab import Work
 from app.services.live_views import Phase, RunBrief
+from app.services.lookup import find_gyro
 from app.services.views import (
     MeasurementView,
     Page,

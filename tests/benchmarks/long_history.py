@@ -31,8 +31,8 @@ from serving import GRID, NotingQueue, running
 from app.exchange.rows import CertificateRow
 from app.services import access, gyros, stands
 from app.services.drift import baselines, series, studying
-from app.services.finding import find_gyro
 from app.services.lab import Lab, Person
+from app.services.lookup import find_gyro
 from app.services.opening import open_lab
 from app.settings import Settings
 from app.store.tables import (

@@ -6,8 +6,8 @@ from typing import Final
 from app.services import access
 from app.services.drift import alarms, baselines, events, series
 from app.services.drift.series import aware
-from app.services.finding import find_gyro
 from app.services.lab import Person, Work
+from app.services.lookup import find_gyro
 from simdevice.fleet import DAY, REPAIRED, FleetGyro
 from solver.records import PARAMETERS
 

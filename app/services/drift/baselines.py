@@ -17,8 +17,8 @@ from app.services import access
 from app.services.drift import charting, events, following, series
 from app.services.drift.series import SeriesTable, aware, moment
 from app.services.drift.views import BaselineView, ProposedBaseline
-from app.services.finding import find_gyro
 from app.services.lab import Work
+from app.services.lookup import find_gyro
 from app.store import drift
 from app.store.tables import Baseline
 from solver.drift.control import baseline as frozen

@@ -18,8 +18,8 @@ from app.exchange.json_values import Json
 from app.services import verdicts
 from app.services.drift import due
 from app.services.drift.comparing_views import Agreement, Compared, ComparisonView, Side
-from app.services.finding import find_gyro
 from app.services.lab import Work
+from app.services.lookup import find_gyro
 from app.services.views import ParameterView
 from app.store import fleet, results
 from app.store.tables import Calibration

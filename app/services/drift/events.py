@@ -10,8 +10,8 @@ from app.errors import Conflict, Invalid, NotFound, problem
 from app.services.drift import following
 from app.services.drift.series import SeriesTable, aware
 from app.services.drift.views import EventView
-from app.services.finding import find_gyro
 from app.services.lab import Work
+from app.services.lookup import find_gyro
 from app.services.stands import find_stand
 from app.store import drift
 from app.store.tables import Event

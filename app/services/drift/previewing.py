@@ -10,8 +10,8 @@ from app.exchange.si import PARAMETER_UNITS
 from app.services.drift import baselines, charting, series
 from app.services.drift.series import SeriesTable
 from app.services.drift.views import BaselineView
-from app.services.finding import find_gyro
 from app.services.lab import Work
+from app.services.lookup import find_gyro
 from solver.drift.control import false_alarms
 from solver.drift.control.baseline import Baseline, Estimator, Limits
 from solver.drift.control.false_alarms import Chances

@@ -21,9 +21,9 @@ from app.services.drift.views import (
     ParameterDrift,
     ReplacedValue,
 )
-from app.services.finding import find_gyro
 from app.services.job_views import job_view
 from app.services.lab import Work
+from app.services.lookup import find_gyro
 from app.services.verdicts import judge
 from app.services.views import COVERAGE_FACTOR
 from app.store import drift, drift_series, results

@@ -17,11 +17,11 @@ EWMA
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 from solver.drift.control.baseline import D2, D4, WIDTH, Baseline, Limits
 from solver.drift.control.run_rules import Mask, Violation, episodes, violations
@@ -196,9 +196,8 @@ def judged_points(history: History, judged: Mask | None) -> Mask:
 
 def _decaying(weight: float, keep: float, values: Array) -> Array:
     """``y_i = weight·x_i + keep·y_{i−1}``, y before the first 0, (n,)."""
-    if not len(values):
-        return values
-    return np.asarray(signal.lfilter([weight], [1.0, -keep], values))
+    weighted = (weight * values).tolist()
+    return np.array([*accumulate(weighted, lambda before, new: keep * before + new, initial=0.0)][1:])
 
 
 def _half_widths(

@@ -7,7 +7,7 @@ from laid import BEGIN, METROLOGIST, MONTH, TECHNICIAN, drawn, revision, session
 
 from app.errors import Conflict, Forbidden, Invalid, NotFound
 from app.services.drift import alarms, baselines, events, reading, series
-from app.services.finding import find_gyro
+from app.services.lookup import find_gyro
 
 SHIFT = 0.5
 """Twenty-five times the scatter: no chance makes it."""

@@ -6,7 +6,7 @@ from laid import BEGIN, METROLOGIST, MONTH, SCATTER, TECHNICIAN, drawn, revision
 
 from app.errors import Conflict, Forbidden, Invalid, NotFound
 from app.services.drift import baselines, events, reading, series
-from app.services.finding import find_gyro
+from app.services.lookup import find_gyro
 
 
 def _results(lab, count=None):

@@ -4,8 +4,8 @@ from laid import TECHNICIAN, drawn, revision, session
 
 from app.services.computing import follow
 from app.services.drift import following, reading, series, studying
-from app.services.finding import find_gyro
 from app.services.ledger import JobLedger
+from app.services.lookup import find_gyro
 from app.store.tables import DriftStudy, Job
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from laid import BEGIN, MONTH, TECHNICIAN, drawn, revision
 
 from app.services.drift import reading, series
-from app.services.finding import find_gyro
+from app.services.lookup import find_gyro
 
 
 def _load(lab, method="least-squares"):

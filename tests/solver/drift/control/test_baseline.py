@@ -192,4 +192,4 @@ def test_what_makes_no_baseline_is_refused(estimator: Estimator) -> None:
 
 def test_an_unknown_estimator_is_refused() -> None:
     with pytest.raises(InputError, match="no estimator of a baseline called range"):
-        freeze(history([1.0, 2.0]), "range")  # type: ignore[arg-type]
+        freeze(history([1.0, 2.0]), "range")

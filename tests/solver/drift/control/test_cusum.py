@@ -60,10 +60,10 @@ def test_is_its_recursion(limits: str) -> None:
     u = rng.uniform(0.0, 1.0, 300)
     values = history(rng.normal(0.4, 1.2, 300), u)
     baseline = Baseline(0.1, 0.6, 7.0, 8, "paule-mandel", 0.5)
-    found = cusum(values, baseline, 0.4, 3.0, limits)  # type: ignore[arg-type]
+    found = cusum(values, baseline, 0.4, 3.0, limits)
     up = down = 0.0
     ups, downs = [], []
-    for z in baseline.standardised(values.value, u, limits):  # type: ignore[arg-type]
+    for z in baseline.standardised(values.value, u, limits):
         up, down = max(0.0, up + z - 0.4), max(0.0, down - z - 0.4)
         ups.append(up)
         downs.append(down)

@@ -193,7 +193,7 @@ def test_units_and_origins_do_not_matter() -> None:
 )
 def test_odd_histories_are_described(time: object, value: object, u: object) -> None:
     """Finite numbers everywhere, whatever comes; with breaks as well."""
-    history = History.sorted_from(time, value, u)  # type: ignore[arg-type]
+    history = History.sorted_from(time, value, u)
     for breaks in ((), (0.5, 1.0, 2.0, 14.5)):
         course = describe(history, breaks)
         numbers = [*course.coefficients, *course.covariance.ravel(), *course.fitted, *course.u_fitted]
