@@ -74,12 +74,14 @@ class Measured:
         return f"{self.value} ± {self.expanded}" if self.expanded else str(self.value)
 
 
-def measured(value: float | None, expanded: float | None, otherwise: int = 4) -> Measured:
-    """Round value and U together; without U the value has `otherwise` decimals and no ±."""
+def measured(
+    value: float | None, expanded: float | None, otherwise: int = 4, *, sign: bool = False
+) -> Measured:
+    """Round value and U together; without U the value has `otherwise` decimals and no ±; `sign` as in `figure`."""
     decimals = decimals_of(expanded)
     if value is None or decimals is None:
-        return Measured(figure(value, otherwise), None)
-    return Measured(figure(value, decimals), figure(expanded, decimals))
+        return Measured(figure(value, otherwise, sign=sign), None)
+    return Measured(figure(value, decimals, sign=sign), figure(expanded, decimals))
 
 
 def significant(value: float | None, digits: int = 3) -> str:

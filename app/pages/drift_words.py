@@ -34,6 +34,8 @@ def sentence(template: str, values: Mapping[str, Any]) -> str:
 
 
 def _readable(name: str, value: Any) -> Any:
+    if isinstance(value, dict):
+        return str(figures.measured(**value))
     if not isinstance(value, str):
         return value
     if name == "unit":

@@ -31,6 +31,12 @@ def test_russian_has_a_decimal_comma_and_both_a_true_minus() -> None:
     assert str(shown.expanded) == "0,0021"
 
 
+def test_a_change_says_which_way() -> None:
+    assert str(figures.measured(0.5112, 0.0214, sign=True)) == "+0.511 ± 0.021"
+    assert str(figures.measured(-57.4, 26.0, sign=True)) == "−57 ± 26"
+    assert str(figures.measured(0.00001, 0.0021, sign=True)) == "0.0000 ± 0.0021"  # no way at all
+
+
 @pytest.mark.parametrize("expanded", [None, 0.0, float("nan"), float("inf")])
 def test_without_a_usable_u_nothing_is_claimed(expanded: float | None) -> None:
     shown = figures.measured(1.23456789, expanded)

@@ -18,6 +18,7 @@ from app.exchange.json_values import Json
 from app.services.drift.alarms import Finding
 from app.services.drift.charting import Signal
 from app.services.drift.series import SeriesTable, iso, moment
+from app.services.drift.views import Quantity, quantity
 from app.services.verdicts import judge
 from solver.drift.control.run_rules import RULES
 from solver.errors import Message
@@ -59,7 +60,7 @@ def _rules(table: SeriesTable, told: Told) -> Iterator[Finding]:
     ):
         for run in episodes(list(signals)):
             first, last = run[0], int(run[-1].places[-1])
-            values = {"unit": told.unit, "value": float(table[f"{told.name}.value"][last]), "rule": rule,
+            values = {"unit": told.unit, "value": _at(table, told, last), "rule": rule,
                       "count": len({int(place) for item in run for place in item.places})}  # fmt: skip
             kind = "beyond-limits" if rule == "nelson-1" else rule
             found = _finding(table, told, kind, first.raised, last, _sentence(kind), values, baseline)
@@ -88,8 +89,8 @@ def _steps(table: SeriesTable, told: Told) -> Iterator[Finding]:
         if change["kind"] != "step" or change["event_kind"] is not None or chance is None or chance > LEVEL:
             continue
         place = int(np.flatnonzero(table["calibration"] == change["calibration"])[0])
-        values = {"unit": told.unit, "size": change["size"], "u": change["u"], "since": change["before"][:10],
-                  "day": change["at"][:10]}  # fmt: skip
+        values = {"unit": told.unit, "size": quantity(change["size"], change["u"], change=True),
+                  "since": change["before"][:10], "day": change["at"][:10]}  # fmt: skip
         found = _finding(table, told, "step", place, place, _STEP, values, None)
         yield replace(found, since=change["since"], until=change["until"])
 
@@ -100,8 +101,8 @@ def _trend(table: SeriesTable, told: Told) -> Iterator[Finding]:
         return
     places = table.determined(told.name)
     since = int(np.searchsorted(table["measured_at"], _moment(trend["since"])))
-    values = {"unit": told.unit, "slope": trend["slope_per_year"], "u": trend["u_slope_per_year"],
-              "since": trend["since"][:10]}  # fmt: skip
+    values = {"unit": told.unit, "since": trend["since"][:10],
+              "slope": quantity(trend["slope_per_year"], trend["u_slope_per_year"], change=True)}  # fmt: skip
     last = int(places[-1])
     found = _finding(table, told, "trend", last, last, _TREND, values, None)
     yield replace(found, since=iso(table["measured_at"][since]))
@@ -117,7 +118,7 @@ def _limits(table: SeriesTable, told: Told, low: float | None, high: float | Non
     if outside and outside[-1] == int(places[-1]):
         cuts = np.flatnonzero(np.diff(outside) > GAP + 1)
         first, last = outside[int(cuts[-1]) + 1 if len(cuts) else 0], outside[-1]
-        values = {"unit": told.unit, "value": float(value[last]), "low": low, "high": high}
+        values = {"unit": told.unit, "value": _at(table, told, last), "low": low, "high": high}
         yield _finding(table, told, "out-of-limits", first, last, _OUT, values, None)
 
 
@@ -147,6 +148,11 @@ def _repeatability(table: SeriesTable, told: Told) -> Iterator[Finding]:
     yield replace(found, since=iso(table["measured_at"][first]))
 
 
+def _at(table: SeriesTable, told: Told, place: int) -> Quantity:
+    value, u, k = (float(table[f"{told.name}.{part}"][place]) for part in ("value", "u", "k"))
+    return quantity(value, u, k)
+
+
 def _finding(
     table: SeriesTable, told: Told, kind: str, first: int, last: int, sentence: Message,
     values: dict[str, Any], baseline: int | None,
@@ -163,7 +169,7 @@ def _moment(text: str) -> np.datetime64:
 
 
 _BEYOND: Final = Message(
-    "beyond-limits", "%(count)d beyond the control limits, the last at %(value).5g %(unit)s."
+    "beyond-limits", "%(count)d beyond the control limits, the last at %(value)s %(unit)s."
 )
 _EWMA: Final = Message(
     "ewma", "The weighted average left its limits: the level has shifted, by little or slowly."
@@ -172,13 +178,14 @@ _CUSUM: Final = Message(
     "cusum", "The cumulative sum left its limits: the level has shifted, by little or slowly."
 )
 _STEP: Final = Message(
-    "step", "A step of %(size).3g %(unit)s (u = %(u).2g) between %(since)s and %(day)s; no event explains it."
+    "step", "A step of %(size)s %(unit)s between %(since)s and %(day)s; no event explains it."
 )
-_TREND: Final = Message("trend", "Drifts by %(slope).3g %(unit)s a year (u = %(u).2g) since %(since)s.")
-_OUT: Final = Message("out-of-limits", "%(value).5g %(unit)s lies outside the limits %(low)g to %(high)g.")
+_TREND: Final = Message("trend", "Drifts by %(slope)s %(unit)s a year since %(since)s.")
+_OUT: Final = Message("out-of-limits", "%(value)s %(unit)s lies outside the limits %(low)g to %(high)g.")
 _AHEAD: Final = Message(
     "limit-ahead", "Will reach the limit %(limit)g %(unit)s about %(day)s (%(earliest)s to %(latest)s)."
 )
 _SCATTER: Final = Message(
-    "repeatability", "Scatters by %(sd).3g %(unit)s from session to session; %(limit)g is allowed."
+    "repeatability",
+    "Scatters by %(sd).2g %(unit)s from session to session (at least %(low).2g); %(limit)g is allowed.",
 )

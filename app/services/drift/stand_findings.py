@@ -10,7 +10,7 @@ from app.exchange.json_values import Json, finite
 from app.exchange.si import PARAMETER_UNITS, parameter_lab
 from app.services.drift.alarms import Finding
 from app.services.drift.series import SeriesTable, aware, iso
-from app.services.drift.views import EventView
+from app.services.drift.views import EventView, quantity
 from solver.drift.stands import attribution
 from solver.errors import Message
 from solver.records import PARAMETERS
@@ -84,8 +84,7 @@ def alarms(document: Json) -> Iterator[Finding]:
             "since": item["since"][:10],
             "day": item["until"][:10],
             "probability": item["probability"],
-            "size": item["size_arcsec"],
-            "u": item["u_arcsec"],
+            "size": quantity(item["size_arcsec"], item["u_arcsec"], change=True),
             "gyro": item["gyro"],
         }
         yield Finding(
@@ -104,19 +103,19 @@ def _kind(item: Json) -> str | None:
 
 _SENTENCES: Final = {
     "stand-azimuth": Message(
-        "stand-azimuth", "The base turned by %(size)+.0f″ (u = %(u).0f″) about the vertical between %(since)s and "
+        "stand-azimuth", "The base turned by %(size)s″ about the vertical between %(since)s and "
         "%(day)s; probability %(probability).3g."),
     "stand-level-north": Message(
-        "stand-level-north", "The base tilted by %(size)+.0f″ (u = %(u).0f″) about north between %(since)s and "
+        "stand-level-north", "The base tilted by %(size)s″ about north between %(since)s and "
         "%(day)s; probability %(probability).3g."),
     "stand-level-east": Message(
-        "stand-level-east", "The base tilted by %(size)+.0f″ (u = %(u).0f″) about east between %(since)s and "
+        "stand-level-east", "The base tilted by %(size)s″ about east between %(since)s and "
         "%(day)s; probability %(probability).3g."),
     "stand-certificate": Message(
         "stand-certificate", "At the new certificate of %(day)s all gyros changed together by more than the "
         "certificates state; probability %(probability).3g."),
 }  # fmt: skip
 _UNCLEAR: Final = Message(
-    "stand-or-gyro", "Between %(since)s and %(day)s the base tilted by %(size)+.0f″ (u = %(u).0f″) about east, or one "
+    "stand-or-gyro", "Between %(since)s and %(day)s the base tilted by %(size)s″ about east, or one "
     "gyro changed: the others do not tell. Measure another gyro."
 )  # fmt: skip

@@ -1,15 +1,33 @@
 """What the drift history shows: frozen, in laboratory units, with no tie to the database.
 
 Sentences are English templates with their values, to be translated where they are shown. Among the values
-``unit`` is a unit's code (``deg/h``), and ``day``, ``since`` and their like are days in ISO 8601.
+``unit`` is a unit's code (``deg/h``), ``day``, ``since`` and their like are days in ISO 8601, and what was
+measured is a `Quantity` with its uncertainty.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
+from typing import Any, TypedDict
 
-from app.services.views import JobView, Verdict
+from app import figures
+from app.services.views import COVERAGE_FACTOR, JobView, Verdict
+
+
+class Quantity(TypedDict):
+    """A measured number among a sentence's values, for `figures.measured`; a change is shown with its sign."""
+
+    value: float | None
+    expanded: float | None
+    sign: bool
+
+
+def quantity(
+    value: float | None, u: float | None, k: float = COVERAGE_FACTOR, *, change: bool = False
+) -> Quantity:
+    """A `Quantity` with U = k·u; of a u that is not known (None, NaN) there is none."""
+    return Quantity(value=value, expanded=k * u if u is not None and math.isfinite(u) else None, sign=change)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +146,11 @@ class AlarmView:
     @property
     def detail(self) -> str:
         """Its sentence in English."""
-        return self.template % self.values if self.values else self.template
+        values = {
+            name: str(figures.measured(**value)) if isinstance(value, dict) else value
+            for name, value in self.values.items()
+        }
+        return self.template % values if values else self.template
 
 
 @dataclass(frozen=True, slots=True)

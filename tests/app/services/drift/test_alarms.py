@@ -1,5 +1,6 @@
 """Alarms: once for each episode, kept up, answered for by a person, ended when nothing shows them any more."""
 
+import re
 from datetime import timedelta
 
 import pytest
@@ -65,7 +66,13 @@ def test_a_step_is_an_alarm_and_explained_by_an_event_it_lapses(lab, judged, fol
     step = _alarms(lab)["step"]
     assert step.session == sessions[0]
     # Size by the means of both sides: 0.02·√(1/12 + 1/5) is its standard deviation, five times that the bound.
-    assert step.values["size"] == pytest.approx(SHIFT, abs=5 * 0.0107)
+    assert step.values["size"]["value"] == pytest.approx(SHIFT, abs=5 * 0.0107)
+    assert (
+        0.0214 <= step.values["size"]["expanded"] < 2 * 0.0214
+    )  # k = 2; the scatter is estimated, the date not sure
+    assert re.match(
+        r"A step of \+0\.\d{3} ± 0\.0\d\d deg/h between 20", step.detail
+    )  # down to U's second digit
     with lab.write(TECHNICIAN) as work:
         events.add(work, "repair", BEGIN + 11.5 * MONTH, "bearing", gyro="0417")
     follow_jobs()

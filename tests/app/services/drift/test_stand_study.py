@@ -57,7 +57,8 @@ def test_a_turn_of_an_arcminute_is_the_stand_s(quiet, turn, direction, u) -> Non
     assert at[0] - timedelta(days=45) < true <= at[1] + timedelta(days=45)
     (alarm,) = stand_findings.alarms(document)
     assert alarm.kind == f"stand-{direction}"
-    assert abs(alarm.values["size"] - 60.0) < 20
+    assert alarm.values["size"]["value"] == found["size_arcsec"]
+    assert alarm.values["size"]["expanded"] == 2 * found["u_arcsec"]
 
 
 def test_a_tilt_about_east_is_the_stand_s_when_all_gyros_show_it(quiet) -> None:
