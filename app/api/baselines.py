@@ -24,6 +24,8 @@ _COLUMNS: Final[Columns[Baseline]] = {
     "scatter": lambda item: item.scatter,
     "dof": lambda item: item.dof,
     "u_typical": lambda item: item.u_typical,
+    "within": lambda item: item.within,
+    "count": lambda item: item.count,
     "limits": lambda item: item.limits,
     "calibrations": lambda item: " ".join(map(str, item.calibrations)),
     "reason": lambda item: item.reason,

@@ -67,6 +67,8 @@ class Baseline(Outgoing):
     scatter: float
     dof: float
     u_typical: float
+    within: Annotated[float, Field(description="Scatter of the sessions of one start; 0 where none has two.")]
+    count: Annotated[int, Field(description="Starts among these sessions that determined the parameter.")]
     limits: str
     rules: dict[str, Any]
     reason: str

@@ -22,22 +22,23 @@ from app.services.lookup import find_gyro
 from app.store import drift
 from app.store.tables import Baseline
 from solver.drift.control import baseline as frozen
+from solver.drift.start_means import occasions, start_means
 from solver.errors import SolverError
 from solver.records import PARAMETERS
 
 ESTIMATORS: Final = get_args(frozen.Estimator)
 LIMITS: Final = get_args(frozen.Limits)
 FEWEST: Final = 5
-"""Sessions of a baseline: with fewer its scatter is known to no better than a factor of three."""
+"""Starts of a baseline: with fewer its scatter is known to no better than a factor of three."""
 PROPOSED: Final = 25
-"""Sessions that are proposed at the most: as many as textbooks ask for; those that follow are judged."""
+"""Starts that are proposed at the most: as many as textbooks ask for; those that follow are judged."""
 _LONGEST: Final = 4000
 
 
 def propose(
     work: Work, serial: str, *, method: str = "least-squares", since: datetime | None = None
 ) -> ProposedBaseline:
-    """The first stretch of at least `FEWEST` sessions that no event interrupts, at most `PROPOSED` long.
+    """The first stretch of at least `FEWEST` starts that no event interrupts, at most `PROPOSED` of them.
 
     Raises
     ------
@@ -52,9 +53,10 @@ def propose(
     chosen = table.rows(found)
     parameters = {}
     for name in PARAMETERS:
-        if len(chosen.determined(name)) >= FEWEST:
+        means = start_means(chosen.history(name)).history
+        if len(means) >= FEWEST:
             try:
-                made = frozen.freeze(chosen.history(name), "paule-mandel")
+                made = frozen.freeze(means, "paule-mandel")
             except SolverError:  # values without any scatter make no baseline; the others do
                 continue
             parameters[name] = {"centre": made.centre, "scatter": made.scatter, "dof": made.dof}
@@ -73,8 +75,10 @@ def _breaks(work: Work, table: SeriesTable, serial: str) -> list[datetime]:
 def _stretch(table: SeriesTable, breaks: Sequence[datetime]) -> NDArray[np.int64] | None:
     edges = np.searchsorted(table["measured_at"], np.array([moment(at) for at in breaks], "datetime64[us]"))
     for stretch in np.split(np.arange(len(table)), edges):
-        if len(stretch) >= FEWEST:
-            return stretch[:PROPOSED]
+        start = occasions(table["start"][stretch])
+        order = np.unique(start, return_index=True)[1]  # each start's first session
+        if len(order) >= FEWEST:
+            return stretch[np.isin(start, start[np.sort(order)[:PROPOSED]])]
     return None
 
 
@@ -108,8 +112,8 @@ def freeze(
     Forbidden
         The person's role does not judge.
     Invalid
-        An unknown name or rule, too few sessions, a result that does not count, a parameter that the sessions
-        chosen do not give a baseline for.
+        An unknown name or rule, a time to come, too few sessions, a result that does not count, a parameter that the
+        sessions chosen do not give a baseline for.
     """
     access.require_judge(work.person)
     gyro = find_gyro(work, serial)
@@ -117,6 +121,9 @@ def freeze(
     check(parameters, estimator, limits, reason)
     table = chosen(series.load(work, gyro.id, method), calibrations)
     begin = valid_from or aware(table["measured_at"][0])
+    if begin > work.now:
+        raise Invalid(problem("future-baseline", "A baseline that holds from a time to come judges nothing; give the "
+                              "time of a session.", column="valid_from"))  # fmt: skip
     rows = [
         Baseline(
             gyro_id=gyro.id, parameter=name, method=method, valid_from=begin,
@@ -166,14 +173,14 @@ def chosen(table: SeriesTable, calibrations: Sequence[int]) -> SeriesTable:
 
 def numbers(table: SeriesTable, name: str, estimator: str) -> dict[str, Any]:
     """What a baseline of these sessions is for a parameter; `Invalid` when they give none."""
-    history = table.history(name)
-    if len(history) < FEWEST:
-        raise Invalid(problem("baseline-undetermined", "Only %(count)d of these sessions determine %(parameter)s; a "
-                              "baseline needs %(fewest)d.", column="parameters", count=len(history),
-                              parameter=name, fewest=FEWEST))  # fmt: skip
+    means = start_means(table.history(name))
+    if len(means.history) < FEWEST:
+        raise Invalid(problem("baseline-undetermined", "%(parameter)s was determined in %(count)d starts of these "
+                              "sessions only; a baseline needs %(fewest)d.", column="parameters",
+                              count=len(means.history), parameter=name, fewest=FEWEST))  # fmt: skip
     kind: frozen.Estimator = next(item for item in ESTIMATORS if item == estimator)
     try:
-        made = frozen.freeze(history, kind)
+        made = frozen.freeze(means.history, kind)
     except SolverError as error:
         message = error.message
         raise Invalid(
@@ -181,7 +188,7 @@ def numbers(table: SeriesTable, name: str, estimator: str) -> dict[str, Any]:
         ) from error
     return {
         "estimator": made.estimator, "centre": made.centre, "scatter": made.scatter, "dof": made.dof,
-        "u_typical": made.u_typical,
+        "u_typical": made.u_typical, "within": means.within, "count": made.count,
     }  # fmt: skip
 
 
@@ -233,8 +240,8 @@ def _views(work: Work, rows: Sequence[Baseline], gyro: str) -> tuple[BaselineVie
             method=row.method, valid_from=row.valid_from, calibrations=tuple(row.calibrations),
             sessions=tuple(sessions[key] for key in row.calibrations), estimator=row.estimator,
             centre=row.centre, scatter=row.scatter, dof=row.dof, u_typical=row.u_typical,
-            limits=row.limits, rules=row.rules, reason=row.reason, frozen_at=row.frozen_at,
-            frozen_by=row.frozen_by, retired_at=row.retired_at, retired_by=row.retired_by,
+            within=row.within, count=row.count, limits=row.limits, rules=row.rules, reason=row.reason,
+            frozen_at=row.frozen_at, frozen_by=row.frozen_by, retired_at=row.retired_at, retired_by=row.retired_by,
         )
         for row in rows
     )  # fmt: skip

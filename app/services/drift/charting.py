@@ -3,6 +3,8 @@
 A baseline judges the sessions from its `valid_from` up to the next one's, or to the first repair or adjustment of
 the gyro after the sessions that it was made of. Those themselves stand on its charts and raise nothing. All three
 charts are drawn; what raises alarms was chosen with the baseline.
+
+What is judged is a start: the mean of its sessions, which share what it brought (`solver.drift.start_means`).
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -20,6 +22,7 @@ from solver.drift.control.baseline import WIDTH, Baseline, Estimator, Limits
 from solver.drift.control.charts import WEIGHT, ewma, individuals
 from solver.drift.control.cusum import ALLOWANCE, DECISION, cusum
 from solver.drift.control.run_rules import RULES
+from solver.drift.start_means import start_means
 
 CHARTS: Final = (
     "individuals", "individuals_centre", "individuals_low", "individuals_high", "moving_range", "moving_range_centre",
@@ -174,12 +177,7 @@ def _judged(
 def of_view(view: BaselineView) -> Baseline:
     """The baseline as the solver knows it, from the numbers that were kept."""
     return Baseline(
-        view.centre,
-        view.scatter,
-        view.dof,
-        len(view.calibrations),
-        cast(Estimator, view.estimator),
-        view.u_typical,
+        view.centre, view.scatter, view.dof, view.count, cast(Estimator, view.estimator), view.u_typical
     )
 
 
@@ -192,8 +190,9 @@ def _drawn(
 ) -> Iterator[Signal]:
     """Draw the three charts of one baseline; the rules broken that were chosen with it."""
     kept, limits = of_view(view), cast(Limits, view.limits)
-    history = table.rows(places).history(parameter)
-    new = ~np.isin(table["session"][places], view.sessions)
+    means = start_means(table.rows(places).history(parameter), view.within)
+    history = means.history
+    new = np.bincount(means.member, np.isin(table["session"][places], view.sessions)) == 0.0
     single = individuals(history, kept, limits, view.rules.get("individuals", ()), new)
     average = ewma(history, kept, **view.rules.get("ewma", _SETTINGS["ewma"]), limits=limits, judged=new)
     sums = cusum(history, kept, **view.rules.get("cusum", _SETTINGS["cusum"]), limits=limits, judged=new)
@@ -205,13 +204,14 @@ def _drawn(
         "cusum_above": sums.up, "cusum_below": sums.down, "cusum_high": sums.decision,
     }  # fmt: skip
     for name, column in drawn.items():
-        columns[f"{parameter}.{name}"][places] = column
+        columns[f"{parameter}.{name}"][places] = np.broadcast_to(np.asarray(column), len(history))[means.member]
     for found, chosen in (
         (single.violations, True), (average.violations, "ewma" in view.rules), (sums.violations, "cusum" in view.rules),
     ):  # fmt: skip
         if chosen:
             for item in found:
-                yield Signal(item.rule, view.id, places[item.first : item.last + 1], int(places[item.raised]))
+                shown = (means.member >= item.first) & (means.member <= item.last)
+                yield Signal(item.rule, view.id, places[shown], int(places[means.first[item.raised]]))
 
 
 def _document(view: BaselineView, table: SeriesTable) -> Json:
@@ -219,7 +219,7 @@ def _document(view: BaselineView, table: SeriesTable) -> Json:
     gone = sorted(set(view.calibrations) - set(table["calibration"].tolist()))
     return {
         "baseline": view.id, "centre": view.centre, "scatter": view.scatter, "dof": view.dof,
-        "u_typical": view.u_typical, "count": len(view.calibrations), "estimator": view.estimator,
+        "u_typical": view.u_typical, "within": view.within, "count": view.count, "estimator": view.estimator,
         "limits": view.limits, "rules": dict(view.rules), "valid_from": view.valid_from.isoformat(),
         "replaced": gone,
     }  # fmt: skip

@@ -13,8 +13,9 @@ from app.services.drift.views import BaselineView
 from app.services.lab import Work
 from app.services.lookup import find_gyro
 from solver.drift.control import false_alarms
-from solver.drift.control.baseline import Baseline, Estimator, Limits
+from solver.drift.control.baseline import WIDTH, Baseline, Estimator, Limits
 from solver.drift.control.false_alarms import Chances
+from solver.drift.start_means import start_means
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,9 +29,9 @@ class Preview:
     low, high
         Control limits of a value as uncertain as the baseline's are typically.
     count
-        Sessions chosen that determined the parameter.
+        Starts among the sessions chosen that determined the parameter.
     judged, beyond
-        Sessions since the first one chosen that would be judged, and how many of them lie beyond their limits.
+        Starts since the first one chosen that would be judged, and how many of them lie beyond their limits.
     """
 
     parameter: str
@@ -75,12 +76,12 @@ def preview(
     baselines.check(parameters, estimator, limits)
     table = series.load(work, find_gyro(work, serial).id, method)
     chosen = baselines.chosen(table, calibrations)
-    made = {name: _baseline(chosen, name, estimator) for name in parameters}
+    made = {name: baselines.numbers(chosen, name, estimator) for name in parameters}
     kind = cast(Limits, limits)
     found = tuple(_preview(table, chosen, name, line, kind) for name, line in made.items())
     # One statement for all parameters: their degrees of freedom hardly differ, and each costs a second.
-    typical = sorted(made.values(), key=lambda line: line.dof)[len(made) // 2]
-    return Previewed(found, _expected(typical, kind, kept))
+    typical = sorted(made.values(), key=lambda line: float(line["dof"]))[len(made) // 2]
+    return Previewed(found, _expected(_baseline(typical), kind, kept))
 
 
 def chances(view: BaselineView) -> Chances:
@@ -88,26 +89,27 @@ def chances(view: BaselineView) -> Chances:
     return _expected(charting.of_view(view), cast(Limits, view.limits), view.rules)
 
 
-def _baseline(chosen: SeriesTable, name: str, estimator: str) -> Baseline:
-    kept = baselines.numbers(chosen, name, estimator)
+def _baseline(kept: Mapping[str, Any]) -> Baseline:
     return Baseline(
-        kept["centre"], kept["scatter"], kept["dof"], len(chosen.determined(name)),
-        cast(Estimator, kept["estimator"]), kept["u_typical"],
+        kept["centre"], kept["scatter"], kept["dof"], kept["count"], cast(Estimator, kept["estimator"]),
+        kept["u_typical"],
     )  # fmt: skip
 
 
-def _preview(table: SeriesTable, chosen: SeriesTable, name: str, line: Baseline, limits: Limits) -> Preview:
+def _preview(
+    table: SeriesTable, chosen: SeriesTable, name: str, kept: Mapping[str, Any], limits: Limits
+) -> Preview:
+    line = _baseline(kept)
     half = float(line.half_width(line.u_typical, limits))
-    later = table["measured_at"] >= chosen["measured_at"][0]
-    places = [
-        place
-        for place in table.determined(name)
-        if later[place] and table["calibration"][place] not in set(chosen["calibration"].tolist())
-    ]
-    z = line.standardised(table[f"{name}.value"][places], table.noise(name)[places], limits)
+    judged = table.rows(
+        (table["measured_at"] >= chosen["measured_at"][0])
+        & ~np.isin(table["calibration"], chosen["calibration"])
+    )
+    later = start_means(judged.history(name), kept["within"]).history
+    z = line.standardised(later.value, later.u, limits)
     return Preview(
         name, PARAMETER_UNITS[name][0], line.centre, line.scatter, line.dof, line.centre - half, line.centre + half,
-        line.count, len(places), int(np.count_nonzero(np.abs(z) > 3.0)),
+        line.count, len(later), int(np.count_nonzero(np.abs(z) > WIDTH)),
     )  # fmt: skip
 
 

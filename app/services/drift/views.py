@@ -72,7 +72,8 @@ class BaselineView:
     """What a parameter is judged against, with everything that was chosen for it.
 
     `sessions` are those of `calibrations`, the results that it was computed from: a result that is corrected
-    later stays the baseline's.
+    later stays the baseline's. `count` is the number of starts among them that determined the parameter,
+    `within` the scatter of the sessions of one start.
     """
 
     id: int
@@ -88,6 +89,8 @@ class BaselineView:
     scatter: float
     dof: float
     u_typical: float
+    within: float
+    count: int
     limits: str
     rules: Mapping[str, Any]
     reason: str

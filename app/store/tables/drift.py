@@ -64,8 +64,9 @@ class Baseline(Base):
     """What a gyro's parameter is judged against: frozen by a person from sessions that the person chose.
 
     It judges sessions from `valid_from` up to the next baseline's. `calibrations` are the ids of the
-    results it was computed from; `centre` and `scatter` (standard deviation from session to session beyond
-    the sessions' own u) are in laboratory units, as `u_typical`, the u that those sessions had. `limits` is
+    results it was computed from; `centre` and `scatter` (standard deviation from start to start beyond their
+    own u) are in laboratory units, as `u_typical`, the u that those had, and `within`, the scatter of the
+    sessions of one start, 0 where none has two; `count` says of how many starts. `limits` is
     prediction or three-sigma; `rules` maps ``individuals`` to a list of run rules, ``ewma`` and ``cusum`` to
     their settings. It never changes: a new one replaces it, and `retired_at` then says when.
     """
@@ -83,6 +84,8 @@ class Baseline(Base):
     scatter: Mapped[float]
     dof: Mapped[float]
     u_typical: Mapped[float]
+    within: Mapped[float]
+    count: Mapped[int]
     limits: Mapped[str]
     rules: Mapped[dict[str, Any]]
     reason: Mapped[str] = mapped_column(default="")

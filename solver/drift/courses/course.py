@@ -1,9 +1,10 @@
 """What a quantity did and does: its steps and bends, its trend since then, its scatter.
 
 `describe` fits one course to the whole history, ``value_i = course(t_i) + b_i + e_i`` with e_i ~ N(0, u_i²) known and
-b_i ~ N(0, τ²) estimated (`regression`). Changes are found and dated by `steps`, on two
-grounds: a straight line with steps and bends, and exponential ageing with steps; where they differ, Schwarz's
-criterion decides (G. Schwarz, Ann. Statist. 6 (1978) 461-464), each date counted as a parameter. At a given
+b_i ~ N(0, τ²) estimated (`regression`); the values of one start are one, their mean (`solver.drift.start_means`).
+Changes are found and dated by `steps`, on two grounds: a straight line with steps and bends, and exponential ageing
+with steps; where they differ, Schwarz's criterion decides (G. Schwarz, Ann. Statist. 6 (1978) 461-464), each date
+counted as a parameter. At a given
 break, a repair, say, the level may change without being found: it is fitted there always, and tested as any
 coefficient. The trend after the last change is chosen by the tests of `trend`; steps do not change
 the slope, so that values before them tell of it too.
@@ -13,6 +14,7 @@ probabilities, the slope kept where it is not significant (`solver.drift.courses
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -24,6 +26,7 @@ from solver.drift.courses.frame import Frame, framed
 from solver.drift.courses.regression import LINE, Series, Structure
 from solver.drift.courses.sweep import Kind
 from solver.drift.history import History
+from solver.drift.start_means import StartMeans, start_means
 from solver.errors import InputError, Message
 from solver.records import Array
 
@@ -52,10 +55,44 @@ def describe(history: History, breaks: Sequence[float] = (), level: float = LEVE
     """
     if len(history) == 0:
         raise InputError(_EMPTY)
+    means = start_means(history)
+    course = _described(means.history, breaks, level)
+    return course if len(means.history) == len(history) else _of_values(course, means, history)
+
+
+def _described(history: History, breaks: Sequence[float], level: float) -> Course:
+    """Of values that are independent."""
     frame, series = framed(history)
     given = np.searchsorted(history.time, np.asarray(sorted(breaks), np.float64), side="left")
     known = Structure(breaks=tuple(int(one) for one in np.unique(given) if 0 < one < len(history)))
     return _told(history, frame, choose(series, known, level), series, level)
+
+
+def _of_values(course: Course, means: StartMeans, history: History) -> Course:
+    """The course of the starts as one of their values: a change comes with the first value of a start."""
+
+    def changed(one: Change) -> Change:
+        index = int(means.first[one.index])
+        dates = tuple((int(means.first[date]), chance) for date, chance in one.dates)
+        time, before = float(history.time[index]), float(history.time[max(index - 1, 0)])
+        return replace(one, index=index, time=time, before=before, dates=dates)
+
+    wild = {one.index: one for one in course.outliers}
+    return replace(
+        course,
+        changes=tuple(changed(one) for one in course.changes),
+        outliers=tuple(
+            replace(wild[start], index=index, time=float(history.time[index]))
+            for index, start in enumerate(means.member.tolist())
+            if start in wild
+        ),
+        since=int(means.first[course.since]),
+        since_time=float(history.time[means.first[course.since]]),
+        count=int(np.sum((means.member >= course.since) & ~np.isin(means.member, list(wild)))),
+        fitted=course.fitted[means.member],
+        u_fitted=course.u_fitted[means.member],
+        within=means.within,
+    )
 
 
 def _told(history: History, frame: Frame, chosen: Chosen, series: Series, level: float) -> Course:
@@ -90,6 +127,7 @@ def _told(history: History, frame: Frame, chosen: Chosen, series: Series, level:
         u_fitted=u_fitted,
         paths=tuple(frame.path(one) for one in chosen.paths),
         last=frame.last,
+        within=0.0,
     )
 
 

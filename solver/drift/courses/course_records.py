@@ -43,13 +43,13 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Outlier:
-    """A wild value, which does not count for the course.
+    """A wild value, which does not count for the course; of a wild start each of its values.
 
     Attributes
     ----------
     index : int
     time, size, u, p_value : float
-        When, s; value less course; standard uncertainty of that; probability that chance alone
+        When, s; value, or mean of its start, less course; standard uncertainty of that; probability that chance alone
         makes any value so wild.
     """
 
@@ -83,7 +83,9 @@ class Course:
         Of the course at the last value, per second, whether significant or not; its standard uncertainty; and the
         probability of a slope so large where there is none.
     scatter : float
-        τ.
+        τ; of starts, where some have several values.
+    within : float
+        τ_w of values within one start; 0 where no start has two.
     agreement : float
         Factor of the variances u² + τ², less than 1 where the values agree better than their uncertainties.
     dof : int
@@ -119,6 +121,7 @@ class Course:
     u_fitted: Array
     paths: tuple[Path, ...]
     last: float
+    within: float
 
     @property
     def time_constant(self) -> float | None:

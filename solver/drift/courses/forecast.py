@@ -2,10 +2,10 @@
 
 A new value at t lies at ``course(t) + b + e``. On one path (`paths`) with ν degrees of freedom,
 
-    (y − ŷ(t))/√(x(t)·C·x(t)ᵀ + s²·(τ² + u_new²))        follows Student's distribution,
+    (y − ŷ(t))/√(x(t)·C·x(t)ᵀ + s²·(τ² + τ_w² + u_new²))        follows Student's distribution,
 
 with the shapes x(t), the covariance C of level and slope, and the scale s² of the variances; over the paths it is the
-mixture with their probabilities, whose quantiles are the ends of the band. Without τ² and u_new it is the band of
+mixture with their probabilities, whose quantiles are the ends of the band. Without τ², τ_w² and u_new it is the band of
 the course itself.
 
 The course's own band also gives the time at which it reaches a limit L: the times t at which L lies in the band
@@ -96,7 +96,7 @@ def predict(
     """
     time = np.atleast_1d(np.asarray(times, np.float64))
     noise = np.broadcast_to(np.asarray(u_new, np.float64), time.shape)
-    return _band(course, time, noise**2, probability)
+    return _band(course, time, noise**2 + course.within**2, probability)
 
 
 def leaves(
