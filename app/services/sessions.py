@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
-from typing import Any, cast
+from datetime import datetime, timedelta
+from typing import Any, Final, cast
 
 from app.errors import Invalid, NotFound, problem
 from app.services import gyros, stands, verdicts
@@ -22,20 +22,24 @@ from app.services.views import (
 from app.store import equipment, measurement, results, station
 from app.store.tables import Calibration, Gyro, Job, Measurement, MeasuringSession, StandCertificate, Start
 
+ON_FOR: Final = timedelta(hours=12)
+"""A gyro is on for a working day; that it was on longer somebody has to say."""
+
 
 @dataclass(frozen=True, slots=True)
 class NewSession:
     """What is said when a session is opened.
 
-    Without a certificate it is the one valid when the session started; without a start it is the
-    gyro's newest, and `new_start` counts a further power-up.
+    Without a certificate it is the one valid when the session started. Without the number of a start,
+    `new_start` counts a further power-up, or says that it is still the newest; where it says nothing (None), the
+    session belongs to the power-up or session of the gyro that is nearest to it within `ON_FOR`, else to a new one.
     """
 
     gyro: str
     stand: str
     certificate: str | None = None
     start: int | None = None
-    new_start: bool = False
+    new_start: bool | None = None
     started_at: datetime | None = None
     temperature_c: float | None = None
     note: str = ""
@@ -85,8 +89,12 @@ def _start(work: Work, new: NewSession, gyro: Gyro, started_at: datetime) -> Sta
             raise NotFound(problem("unknown-start", "Gyro %(gyro)s has no start %(number)d.", column="start",
                                    gyro=gyro.serial, number=new.start))  # fmt: skip
         return known
-    last = None if new.new_start else equipment.last_start(work.db, gyro.id)
-    return last or gyros.add_start(work, gyro, started_at)
+    known = None
+    if new.new_start is None:
+        known = equipment.start_at(work.db, gyro.id, started_at, ON_FOR)
+    elif not new.new_start:
+        known = equipment.last_start(work.db, gyro.id)
+    return known or gyros.add_start(work, gyro, started_at)
 
 
 def sessions(

@@ -1,12 +1,12 @@
 """Queries for gyros, their types and starts, stands and their certificates."""
 
 from collections.abc import Sequence
-from datetime import date
+from datetime import date, datetime, timedelta
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from app.store.tables import Gyro, GyroType, Stand, StandCertificate, Start
+from app.store.tables import Gyro, GyroType, MeasuringSession, Stand, StandCertificate, Start
 
 
 def gyro(db: Session, serial: str) -> Gyro | None:
@@ -49,6 +49,19 @@ def last_start(db: Session, gyro_id: int) -> Start | None:
     """The gyro's newest power-up."""
     newest = sa.select(Start).where(Start.gyro_id == gyro_id).order_by(Start.number.desc()).limit(1)
     return db.scalar(newest)
+
+
+def start_at(db: Session, gyro_id: int, at: datetime, within: timedelta) -> Start | None:
+    """The power-up that the gyro was on from at a time: of its nearest session, or the latest one before."""
+    session = MeasuringSession
+    near = sa.select(session.started_at, session.start_id).where(
+        session.gyro_id == gyro_id, session.started_at.between(at - within, at + within)
+    )
+    before = sa.select(Start.powered_up_at, Start.id).where(
+        Start.gyro_id == gyro_id, Start.powered_up_at.between(at - within, at)
+    )
+    found = [(abs(when - at), -key) for when, key in (*db.execute(near), *db.execute(before))]
+    return db.get(Start, -min(found)[1]) if found else None
 
 
 def start(db: Session, gyro_id: int, number: int) -> Start | None:

@@ -19,8 +19,9 @@ Celsius = Annotated[Number, Field(ge=-273.15, le=1000)]
 class NewSession(Incoming):
     """A session to open.
 
-    Without `certificate` it is the one valid at the start; without `start` (the number of a
-    power-up) the gyro's newest, and `new_start` counts a further one.
+    Without `certificate` it is the one valid at the start. Without `start` (the number of a power-up),
+    `new_start` true counts a further power-up and false means the newest one; without either the
+    session belongs to the gyro's power-up or session nearest to it within 12 hours, else to a new power-up.
     """
 
     model_config = ConfigDict(
@@ -36,7 +37,7 @@ class NewSession(Incoming):
     stand: Name
     certificate: Name | None = None
     start: Id | None = None
-    new_start: Annotated[bool, Field(strict=True)] = False
+    new_start: Annotated[bool, Field(strict=True)] | None = None
     started_at: Moment | None = None
     temperature_c: Celsius | None = None
     note: Text = ""

@@ -1,9 +1,14 @@
 import csv
 import io
+from datetime import UTC, datetime, timedelta
 
 import httpx
 import pytest
 from serving import Service, opened
+
+from app.services import gyros
+from app.services.access import SYSTEM
+from app.services.lookup import find_gyro
 
 
 def test_a_session_takes_the_valid_certificate(stand: httpx.Client) -> None:
@@ -79,6 +84,40 @@ def test_starts_are_counted(stand: httpx.Client) -> None:
     ]
     assert numbers == [1, 1, 2, 1]
     assert stand.post("/sessions", json={"gyro": "0417", "stand": "S1", "start": 9}).status_code == 404
+
+
+@pytest.mark.parametrize(
+    ("moments", "starts"),
+    [
+        (["2026-03-02T09:00Z", "2026-03-02T14:00Z", "2026-03-02T20:00Z"], [1, 1, 1]),  # a working day
+        (
+            ["2026-03-02T09:00Z", "2026-04-02T09:00Z", "2026-05-02T09:00Z"],
+            [1, 2, 3],
+        ),  # months later it was off
+        (["2026-05-02T09:00Z", "2026-03-02T09:00Z", "2026-05-02T07:30Z"], [1, 2, 1]),  # in any order
+        (["2026-03-02T09:00Z", "2026-03-02T21:00:01Z"], [1, 2]),
+    ],
+)
+def test_a_session_that_names_no_start_has_the_one_of_its_day(stand: httpx.Client, moments, starts) -> None:
+    body = {"gyro": "0417", "stand": "S1"}
+    found = [stand.post("/sessions", json=body | {"started_at": at}).json()["start"] for at in moments]
+    assert found == starts
+    later = body | {
+        "started_at": "2026-09-02T09:00Z",
+        "new_start": False,
+    }  # somebody says that it was left on
+    assert stand.post("/sessions", json=later).json()["start"] == max(starts)
+
+
+def test_a_power_up_that_was_counted_is_the_start_of_what_follows(
+    service: Service, stand: httpx.Client
+) -> None:
+    at = datetime(2026, 3, 2, 9, tzinfo=UTC)
+    with service.lab.write(SYSTEM) as work:
+        gyros.add_start(work, find_gyro(work, "0417"), at)
+        gyros.add_start(work, find_gyro(work, "0417"), at + timedelta(hours=3))
+    body = {"gyro": "0417", "stand": "S1", "started_at": "2026-03-02T13:00Z"}
+    assert stand.post("/sessions", json=body).json()["start"] == 2
 
 
 def test_newest_first_in_parts(stand: httpx.Client) -> None:
