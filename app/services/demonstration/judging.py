@@ -3,18 +3,19 @@
 from datetime import datetime, timedelta
 from typing import Final
 
+import numpy as np
+
 from app.services import access
 from app.services.drift import alarms, baselines, events, series
 from app.services.drift.series import aware
 from app.services.lab import Person, Work
 from app.services.lookup import find_gyro
 from simdevice.fleet import DAY, REPAIRED, FleetGyro
+from solver.drift.start_means import occasions
 from solver.records import PARAMETERS
 
 METROLOGIST: Final = Person("sokolov", "A. Sokolov", "metrologist", frozenset(access.ROLES["metrologist"]))
 _TECHNICIAN: Final = Person("petrova", "I. Petrova", "technician", frozenset(access.ROLES["technician"]))
-_BASELINE: Final = 5
-"""Sessions of a baseline."""
 
 
 def enter_the_repair(work: Work, now: datetime) -> None:
@@ -26,7 +27,7 @@ def enter_the_repair(work: Work, now: datetime) -> None:
 
 
 def freeze_baselines(work: Work, fleet: tuple[FleetGyro, ...], now: datetime) -> None:
-    """Each gyro's first sessions, of the repaired one those after the repair as well."""
+    """Each gyro's first starts, of the repaired one those after the repair as well."""
     work.person = METROLOGIST
     for gyro in fleet:
         _freeze(work, gyro.serial, None, "The first sessions of the year")
@@ -35,9 +36,9 @@ def freeze_baselines(work: Work, fleet: tuple[FleetGyro, ...], now: datetime) ->
 
 def _freeze(work: Work, serial: str, since: datetime | None, reason: str) -> None:
     table = series.load(work, find_gyro(work, serial).id, "least-squares").between(since, None)
-    chosen = table["calibration"][:_BASELINE].tolist()
-    work.now = aware(table["measured_at"][_BASELINE - 1]) + timedelta(days=1)
-    baselines.freeze(work, serial, PARAMETERS, chosen, reason=reason)
+    first = np.flatnonzero(occasions(table["start"]) < baselines.FEWEST)
+    work.now = aware(table["measured_at"][first[-1]]) + timedelta(days=1)
+    baselines.freeze(work, serial, PARAMETERS, table["calibration"][first].tolist(), reason=reason)
 
 
 def acknowledge_the_jump(work: Work, now: datetime) -> None:
