@@ -3,6 +3,7 @@
 import platform
 import sys
 import threading
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -192,19 +193,27 @@ def _verdict(orders: Orders, history: History) -> None:
         result = service.calibration(history.result)
         print_result(f"{orders.gyro} on {orders.stand}", result)
         typer.echo(service.page(history.result))
-    if _contradicted(result["least-squares"] if result["method"] == "both" else result):
-        typer.echo(
-            "driftbook: The currents do not fit together as the currents of one gyro on this stand. Do not use the "
-            "result before somebody has found out why.",
-            err=True,
-        )
+    against = list(_objections(result["least-squares"] if result["method"] == "both" else result))
+    for line in against:
+        typer.echo(f"driftbook: {line}", err=True)
+    if against:
         raise typer.Exit(1)
 
 
-def _contradicted(answer: dict[str, Any]) -> bool:
-    """Whether the fit itself says that something is wrong: a blunder found, or residuals beyond all chance."""
+def _objections(answer: dict[str, Any]) -> Iterator[str]:
+    """What the answer itself says against its use: no solution, parameters not found, currents that do not fit."""
+    if "error" in answer:
+        yield f"There is no result: {answer['error']['message']}"
+        return
+    unknown = [name for name, entry in answer["parameters"].items() if entry["value"] is None]
+    if unknown:
+        yield f"Not determined from these positions: {', '.join(unknown)}. Measure more positions."
     p_value = answer["fit"]["p_value"]
-    return bool(answer["diagnosis"]) or (p_value is not None and p_value < _BEYOND_CHANCE)
+    if answer["diagnosis"] or (p_value is not None and p_value < _BEYOND_CHANCE):
+        yield (
+            "The currents do not fit together as the currents of one gyro on this stand. Do not use the result "
+            "before somebody has found out why."
+        )
 
 
 @station.command()

@@ -274,3 +274,15 @@ def test_currents_that_creep_all_the_time_give_no_result_without_a_warning(labor
     assert run.code == 1
     assert {"partner", "closing"} & {code for _, code in run.codes}
     assert "do not fit together" in run.err or "is not in the session" in run.err
+
+
+def test_parameters_that_were_not_found_are_no_success(laboratory, cycle):
+    """At the pole there is no horizontal Earth rate."""
+    bench = bench_of("pole")
+    stand = laboratory.stand_of(bench)
+    with instruments(bench) as served:
+        run = cycle(served, stand, "--positions", "0/0,90/0,90/90,90/180,90/270")
+    unknown = [name for name, item in run.result["parameters"].items() if item["value"] is None]
+    assert run.code == 1
+    assert unknown
+    assert f"Not determined from these positions: {', '.join(unknown)}." in run.err
