@@ -1,5 +1,6 @@
 """A gyro's drift: values over time with control charts, and what was found of them."""
 
+from datetime import date
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Query, Request, Response
@@ -10,7 +11,7 @@ from app.api.auth import Reader
 from app.api.pagination import TABLE_TOO, Columns, Listing, listed, tabular
 from app.api.schemas.common import Incoming, Name, OptionalText, Since, Until
 from app.api.schemas.drift import By, ComponentLine, GyroDrift, Method, Replaced
-from app.services.drift import reading
+from app.services.drift import due, reading
 from app.services.drift.charting import CHARTS
 from app.services.drift.views import GyroDrift as Found
 from solver.records import PARAMETERS
@@ -65,9 +66,12 @@ def over_time(serial: Name, wanted: Annotated[Wanted, Query()], caller: Reader, 
             work, serial, method=wanted.method, since=wanted.since, until=wanted.until, by=wanted.by,
             parameters=PARAMETERS if wanted.parameter is None else [wanted.parameter], most=wanted.points,
         )  # fmt: skip
+        holds = due.due_of(work, [serial])[serial]
     names = ["parameter", "unit", *_HEAD, *CHARTS, "signals"]
     answer = tabular(request, names, lambda: _rows(found))
-    return answer or JSONResponse(_shown(found).model_dump(mode="json"), headers={"vary": "Accept"})
+    return answer or JSONResponse(
+        _shown(found, holds.due).model_dump(mode="json"), headers={"vary": "Accept"}
+    )
 
 
 @router.get("/gyros/{serial}/drift/components", response_model=Listing[ComponentLine],
@@ -93,9 +97,8 @@ def replaced(
     return listed(request, [Replaced.model_validate(item) for item in found], None, _REPLACED)
 
 
-def _shown(found: Found) -> GyroDrift:
-    document = found.document or {}
-    further = {"interval": document.get("interval"), "due": document.get("due")}
+def _shown(found: Found, until: date | None) -> GyroDrift:
+    further = {"interval": (found.document or {}).get("interval"), "due": until}
     fields: dict[str, Any] = {name: getattr(found, name) for name in Found.__slots__}
     return GyroDrift.model_validate(fields | further)
 

@@ -138,6 +138,7 @@ def _baseline(gyro_id: int, name: str, since: datetime, chosen: list[int], at: d
     return Baseline(
         gyro_id=gyro_id, parameter=name, method="least-squares", valid_from=since, calibrations=chosen,
         estimator="paule-mandel", centre=float(np.mean(values)), scatter=0.3 * U[name], dof=len(chosen) - 1.0,
+        count=len(chosen), within=0.0,
         u_typical=0.6 * U[name], limits="three-sigma", rules={"individuals": ["nelson-1"]},
         reason="After warming up.", frozen_at=at, frozen_by="A. Sokolov",
     )  # fmt: skip
@@ -187,7 +188,7 @@ def document(table: series.SeriesTable, now: datetime) -> dict[str, Any]:
         "gyro": "0417", "method": "least-squares", "sessions": len(table), "solver_version": "2.0.0",
         "from": series.iso(table["measured_at"][0]) if len(table) else None,
         "until": series.iso(table["measured_at"][-1]) if len(table) else None,
-        "parameters": parameters, "due": (now + timedelta(days=88)).isoformat(),
+        "parameters": parameters,
         "interval": {
             "stated_days": 92, "recommended_days": 61.4,
             "reason": {"template": "%(days)d days: the shortest advice is the control chart's, %(wanted)d days.",

@@ -1,6 +1,6 @@
 """A gyro's drift: values over time, what was found of them, events, baselines, alarms."""
 
-from datetime import datetime
+from datetime import date, datetime
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field
@@ -199,7 +199,10 @@ class ParameterDrift(Outgoing):
 
 
 class GyroDrift(Outgoing):
-    """A gyro's drift by one method; `up_to_date` tells whether everything that came in is taken in."""
+    """A gyro's drift by one method; `up_to_date` tells whether everything that came in is taken in.
+
+    `due`: the last day on which its last sound calibration holds, as in the list of what is due.
+    """
 
     gyro: str
     type: str
@@ -213,7 +216,7 @@ class GyroDrift(Outgoing):
     since: datetime | None
     until: datetime | None
     interval: dict[str, Any] | None
-    due: datetime | None
+    due: date | None
     parameters: list[ParameterDrift]
     events: list[Event]
     baselines: list[Baseline]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import timedelta
 from typing import Any
 
 from app.exchange.json_values import Json
@@ -77,13 +77,8 @@ def study(table: SeriesTable, known: Known) -> Studied:
         "from": iso(table["measured_at"][0]) if len(table) else None,
         "until": None if last is None else last.isoformat(), "solver_version": __version__,
         "parameters": entries, "interval": intervals.interval(table, known.limits, known.interval_days, entries),
-        "due": None if last is None else _due(last, known.interval_days),
     }  # fmt: skip
     return Studied(document, table.with_columns(columns), tuple(found))
-
-
-def _due(last: datetime, days: int | None) -> str | None:
-    return None if days is None else (last + timedelta(days=days)).isoformat()
 
 
 def _parameter(table: SeriesTable, known: Known, name: str) -> tuple[Json, dict[str, Column], list[Finding]]:
