@@ -7,7 +7,10 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from app.exchange.limits import SOURCE_NAMES
+from app.exchange.uncertainties import UNCERTAINTY_KEYS
 from app.figures import decimals_of, rounded
+from solver.inputs import SOURCES
 
 _NAMES = {
     "kx": "Kx  scale factor, x", "ky": "Ky  scale factor, y", "kxy": "Kxy cross-coupling, y into x",
@@ -35,9 +38,19 @@ def print_result(name: str, result: Mapping[str, Any]) -> None:
         console.print(_fit_line(method, answers[method]), soft_wrap=True)
         for line in _limits(answers[method]):
             console.print(f"  {line}", soft_wrap=True)
+    exact = taken_as_exact(result)
+    if exact:
+        console.print(f"taken as exact, for nothing is stated: {', '.join(exact)}", soft_wrap=True)
     for line in _findings(answers[methods[0]]):
         console.print(line, soft_wrap=True)
     _print_warnings(result, answers)
+
+
+def taken_as_exact(result: Mapping[str, Any]) -> list[str]:
+    """What all positions share and nobody stated an uncertainty of, in words: no U allows for its error."""
+    stated = result.get("stated", {}).get("uncertainties", {})
+    known = {name for key, (name, _) in UNCERTAINTY_KEYS.items() if stated.get(key)}
+    return [SOURCE_NAMES[line] for line, names in SOURCES.items() if names and not known & set(names)]
 
 
 def _cells(answer: Mapping[str, Any], key: str) -> tuple[str, str]:

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from app.exchange.rows import CertificateRow, CurrentRecord
 from app.exchange.si import parameter_lab
 from app.exchange.uncertainties import Statement, common_uncertainty
-from app.services.views import CommonAngles
+from app.services.views import CommonAngles, Nominal
 from simdevice.ammeter import Ammeter
 from simdevice.bench import Bench, SimulatedPosition, run_session
 from simdevice.certificate import Certificate, Position, certify
 from simdevice.fleet import FleetGyro
 from simdevice.gyro import Gyro
 from simdevice.noise import RateNoise
-from simdevice.scenarios import GVK_6, LABORATORY_AMMETER, TYPES, draw_gyro
+from simdevice.scenarios import GVK_6, LABORATORY_AMMETER, TYPES, GyroType, draw_gyro
 from simdevice.stand import Stand
 from simdevice.thermal import ZERO_CELSIUS
 from solver.inputs import COMMON
@@ -157,6 +157,33 @@ def certificate_lab(certificate: Certificate) -> list[CertificateRow]:
 def common_lab(certificate: Certificate) -> CommonAngles:
     """The systematic part of the simulator's certificate, which all positions share."""
     return CommonAngles(*np.round(arcsec_from_rad(certificate.u_systematic), 3).tolist())
+
+
+def nominal_values(kind: GyroType) -> dict[str, Nominal]:
+    """What the simulated type's gyros are drawn from, as a laboratory would round it."""
+    return {
+        name: Nominal(
+            round(parameter_lab(name, getattr(kind.nominal, name)), 2),
+            float(f"{parameter_lab(name, kind.spread[name]):.2g}"),
+        )
+        for name in PARAMETERS
+    }
+
+
+def errors_stated(bench: Bench) -> dict[str, float]:
+    """Standard uncertainties that allow for the bench's errors of gain, zero and base; no more than it has.
+
+    An ammeter's two channels are of one make: the larger error of both holds for either.
+    """
+    channels = bench.ammeter.channels
+    gain_ppm = max(abs(channel.gain - 1.0) for channel in channels) * 1e6
+    offset_ma = max(abs(float(ma_from_ampere(channel.offset))) for channel in channels)
+    level_1, level_2, azimuth = (abs(float(arcsec_from_rad(angle))) for angle in bench.stand.base)
+    found = {
+        "u_gain_x_ppm": gain_ppm, "u_gain_y_ppm": gain_ppm, "u_offset_x_ma": offset_ma, "u_offset_y_ma": offset_ma,
+        "u_level_1_arcsec": level_1, "u_level_2_arcsec": level_2, "u_azimuth_arcsec": azimuth,
+    }  # fmt: skip
+    return {key: float(f"{value:.4g}") for key, value in found.items() if value}
 
 
 def records_lab(positions: Sequence[SimulatedPosition]) -> list[CurrentRecord]:

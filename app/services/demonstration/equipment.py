@@ -6,18 +6,16 @@ from datetime import datetime, timedelta
 from typing import Final
 
 from app.exchange.rows import CertificateRow
-from app.exchange.si import parameter_lab
 from app.exchange.uncertainties import Statement
 from app.services import gyros, stands
 from app.services.lab import Work
-from app.services.simulated import ammeter_off, certificate_lab, common_lab, deviations
+from app.services.simulated import ammeter_off, certificate_lab, common_lab, deviations, nominal_values
 from app.services.views import Nominal
 from simdevice.ammeter import Ammeter
 from simdevice.certificate import draw_certificate
 from simdevice.fleet import FleetGyro
 from simdevice.scenarios import LABORATORY_AMMETER, TYPES
 from simdevice.stand import Stand
-from solver.records import PARAMETERS
 from solver.units import rad_from_arcsec, rad_from_deg
 
 SEED: Final = 2026
@@ -71,15 +69,10 @@ def register(work: Work, fleet: Sequence[FleetGyro]) -> None:
 
 
 def _nominals(kind: str) -> dict[str, Nominal]:
-    """What the simulated type's gyros are drawn from, as a laboratory would round it."""
-    made = TYPES[kind]
+    """What is expected of the type, and how it changes with the temperature."""
     return {
-        name: Nominal(
-            round(parameter_lab(name, getattr(made.nominal, name)), 2),
-            float(f"{parameter_lab(name, made.spread[name]):.2g}"),
-            _PER_KELVIN[kind].get(name),
-        )
-        for name in PARAMETERS
+        name: item._replace(per_kelvin=_PER_KELVIN[kind].get(name))
+        for name, item in nominal_values(TYPES[kind]).items()
     }
 
 
