@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solver.constants import EARTH_RATE
+from solver.current_noise import current_noise
 from solver.geometry import Elements, elements_of
 from solver.records import Array, Observations
 
@@ -33,7 +34,7 @@ class Equations:
     right_side : (2n,) array
         Earth rate along the case axes, rad/s.
     u_currents : (n, 2) array or None
-        Standard uncertainties of Jx and Jy, A.
+        Standard uncertainties of Jx and Jy to weigh by, A (`solver.current_noise`).
     """
 
     design: Array
@@ -48,11 +49,11 @@ class Equations:
 def observation_equations(observations: Observations) -> Equations:
     """Set up (10)-(15) for every measured position."""
     at = elements_of(observations)
-    u_jx, u_jy = observations.u_jx, observations.u_jy
+    noise = current_noise(observations)
     return Equations(
         design=design_matrix(at, observations.jx, observations.jy),
         right_side=right_side(at, *earth_rate(observations.latitude)),
-        u_currents=None if u_jx is None or u_jy is None else np.stack((u_jx, u_jy), axis=1),
+        u_currents=None if noise is None else noise.u,
     )
 
 

@@ -20,6 +20,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.current_noise import CurrentNoise, current_noise
 from solver.error_model import design_matrix, earth_rate, right_side, scale_matrix
 from solver.errors import InputError, Message
 from solver.geometry import case_orientation, elements
@@ -193,11 +194,12 @@ def inputs_of(
         variances.append(u**2)
         dof.append(freedom)
 
-    if u_currents is None and at.u_jx is not None and at.u_jy is not None:
-        u_currents = np.stack((at.u_jx, at.u_jy), axis=1)
+    noise = current_noise(at)
     if u_currents is not None:
-        freedom = np.stack((at.dof_jx, at.dof_jy), axis=1).ravel()
-        add(["currents"] * len(freedom), by_currents(len(at), parameters), u_currents.ravel(), freedom)
+        noise = CurrentNoise(u_currents, np.stack((at.dof_jx, at.dof_jy), axis=1))
+    if noise is not None:
+        lines = ["currents"] * noise.u.size
+        add(lines, by_currents(len(at), parameters), noise.u.ravel(), noise.dof.ravel())
     if at.u_alpha.any() or at.u_beta.any() or at.u_gamma.any():
         sensitivity, u = _angles(at, parameters)
         add(["angles"] * len(u), sensitivity, u, np.full(len(u), np.inf))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.current_noise import moderated
 from solver.error_model import Equations, design_matrix, earth_rate
 from solver.estimators.block import BLOCK, JX, JY, ONE, RX, RY, C, D, Sound, solve_block
 from solver.estimators.estimation import least_squares
@@ -105,6 +106,8 @@ def solve_sessions(
     jy: Array,
     u_jx: Array | None = None,
     u_jy: Array | None = None,
+    dof_jx: Array | float = np.inf,
+    dof_jy: Array | float = np.inf,
 ) -> BatchSolution:
     """Solve every session by least squares, as `solver.estimators.estimation.least_squares` does one.
 
@@ -117,8 +120,12 @@ def solve_sessions(
         Mean currents, A.
     u_jx, u_jy : (n,) or (N, n) array, optional
         Their standard uncertainties, A; without them all equations count alike.
+    dof_jx, dof_jy : (n,) or (N, n) array or float
+        Degrees of freedom of the standard uncertainties, which are moderated by them (`solver.current_noise`).
     """
     count = len(jx)
+    if u_jx is not None and u_jy is not None:
+        u_jx, u_jy = moderated(u_jx, np.asarray(dof_jx))[0], moderated(u_jy, np.asarray(dof_jy))[0]
     values, chi2 = np.empty((count, 8)), np.empty(count)
     covariance, alone = np.empty((count, 8, 8)), np.empty(count, dtype=np.bool_)
     for part in _blocks(count):

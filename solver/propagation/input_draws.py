@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.constants import EARTH_RATE
+from solver.current_noise import current_noise
 from solver.error_model import scale_matrix
 from solver.geometry import commanded
 from solver.inputs import COMMON, CommonUncertainty
@@ -195,8 +196,9 @@ def input_draws(
     """
     at = observations
     common = common or CommonUncertainty()
-    if u_currents is None and at.u_jx is not None and at.u_jy is not None:
-        u_currents = np.stack((at.u_jx, at.u_jy), axis=1)
+    dof_currents, noise = np.stack((at.dof_jx, at.dof_jy)), current_noise(at)
+    if u_currents is None and noise is not None:
+        u_currents, dof_currents = noise.u, np.ascontiguousarray(noise.dof.T)
     _, first, place = np.unique(
         np.stack((at.theta, at.psi), axis=1), axis=0, return_index=True, return_inverse=True
     )
@@ -211,7 +213,7 @@ def input_draws(
     return InputDraws(
         observations=at,
         u_currents=None if u_currents is None else np.ascontiguousarray(inflation * u_currents.T),
-        dof_currents=np.stack((at.dof_jx, at.dof_jy)),
+        dof_currents=dof_currents,
         mixing=mixing,
         dof_mixing=dof_mixing,
         place=place.ravel(),

@@ -1,5 +1,7 @@
 """Batches beside the single path, session by session."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -91,6 +93,22 @@ def test_what_is_awkward_goes_alone(setup, rng):
     np.testing.assert_array_equal(np.isnan(found.values), np.isnan(values))
     # The same function on equations whose elements were multiplied out in another order.
     np.testing.assert_allclose(found.values[:, 0], values[:, 0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["ordinary", "cross-coupled", "few positions", "repeats"])
+def test_estimated_uncertainties_are_moderated_alike(name, rng):
+    """u with few degrees of freedom, others in every session: still the single path."""
+    sessions, arrays, u = many(SETUPS[name], rng)
+    dof = rng.uniform(4.0, 20.0, u[0].shape)
+    for one in u:
+        one *= np.sqrt(rng.chisquare(dof) / dof)
+    sessions = [
+        replace(one, u_jx=u[0][i], u_jy=u[1][i], dof_jx=dof[i], dof_jy=dof[i])
+        for i, one in enumerate(sessions)
+    ]
+    found = solve_sessions(*arrays, *u, dof, dof)
+    agree(found, one_by_one(sessions))
+    assert np.abs(found.values / solve_sessions(*arrays, *u).values - 1.0).max() > 1e-6  # it does something
 
 
 def test_shared_angles_and_uncertainties(rng):
