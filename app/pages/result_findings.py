@@ -26,6 +26,7 @@ TITLES: Final = {
     "theta-reversed": marked("θ counted the other way"),
     "current-unit": marked("unit of the currents"),
     "unexplained": marked("more scatter than stated"),
+    "far-from-prior": marked("not the gyro expected"),
 }
 """Findings in a few words, by code; pass through `gettext`."""
 

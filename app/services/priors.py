@@ -5,22 +5,18 @@ sign, a wrong latitude or unit. Only such an expectation shows them.
 """
 
 import json
-import math
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any
 
 from app.exchange.json_values import message_json
+from app.exchange.parameters import Known
+from app.exchange.prior import widened
 from app.services.gyros import nominals_of
 from app.services.lab import Work
 from app.services.verdicts import main_method
 from app.store import results
 from app.store.tables import Calibration, MeasuringSession
 from solver.errors import Message
-
-_CHANGE: Final = {"k": 0.01, "w0": 1.0, "w": 1.0}
-"""How far a gyro may have changed since its last calibration (standard deviation): 1 % of the larger scale
-factor for a K, 1 °/h for a fixed drift, which differs from start to start, 1 °/h/g for a g-sensitive one.
-Far more than a sound gyro changes, far less than any of those blunders does."""
 
 Prior = Mapping[str, Any]
 """``{"source": message, "parameters": {"kx": {"value": …, "standard_uncertainty": …}, …}}`` in laboratory units."""
@@ -45,18 +41,20 @@ def expectation(work: Work, session: MeasuringSession) -> Prior | None:
 
 
 def _from_calibration(row: Calibration) -> Prior | None:
-    """A sound result as an expectation; None when its own diagnosis found something or nothing is determined."""
-    stored = json.loads(row.result)
+    """A sound result as an expectation; None when its own diagnosis found something or nothing is determined.
+
+    A gyro that was itself not the one expected is what is expected from then on.
+    """
     method = main_method(row)
-    if stored.get(method, stored).get("diagnosis"):
+    stored = json.loads(row.result)
+    if any(item["code"] != "far-from-prior" for item in stored.get(method, stored).get("diagnosis") or ()):
         return None
     known = {
-        item.parameter: (item.value, item.standard_uncertainty)
+        item.parameter: Known(item.value, item.standard_uncertainty)
         for item in row.parameters
         if item.method == method and item.value is not None and item.standard_uncertainty is not None
     }
-    scale = max((abs(known[name][0]) for name in ("kx", "ky") if name in known), default=0.0)
-    if not scale:
+    if not known.keys() & {"kx", "ky"}:
         return None
     source = Message(
         "prior-calibration", "calibration %(number)d, session %(session)d",
@@ -65,13 +63,7 @@ def _from_calibration(row: Calibration) -> Prior | None:
     return {
         "source": message_json(source),
         "parameters": {
-            name: {"value": value, "standard_uncertainty": math.hypot(u, _change(name, scale))}
-            for name, (value, u) in known.items()
+            name: {"value": item.value, "standard_uncertainty": item.standard_uncertainty}
+            for name, item in widened(known).items()
         },
     }
-
-
-def _change(name: str, scale: float) -> float:
-    if name.startswith("k"):
-        return _CHANGE["k"] * scale
-    return _CHANGE["w0" if name.startswith("w0") else "w"]

@@ -24,15 +24,20 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
+from scipy import special
 
 from solver.blunders.channel_faults import surely_stuck
 from solver.blunders.explanations import INVISIBLE, Explanation, invisible, twins, visible
+from solver.blunders.hypothesis_fit import Fitted
 from solver.blunders.hypothesis_score import Session
 from solver.blunders.prior import Prior
 from solver.blunders.suspicion import suspect
 from solver.blunders.verdicts import (
     cannot_exclude,
+    differences,
     factor_text,
+    far_from_prior,
+    or_changed,
     place,
     places,
     separate,
@@ -53,6 +58,8 @@ _OVERSTATED: Final = 1e-3
 """χ² over its freedom below which the stated noise is of no use: u(J) in another unit than J, perhaps."""
 _MOST_EQUIVALENT: Final = 6
 _APART: Final = 3.0
+_CONCEIVABLE: Final = 5.0
+"""How many times more than the prior says a gyro may have changed, at most, to be believed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +69,7 @@ class Finding:
     Attributes
     ----------
     code
+        ``unexplained`` and ``far-from-prior`` say that something is wrong and no blunder explains it.
     message
         What it is and what to do.
     positions
@@ -72,7 +80,7 @@ class Finding:
         ``channel``, ``actual`` (θ, ψ in rad), ``factor``, … and ``equivalents``: the other members of
         its class, each a mapping with ``code``, ``positions`` and its details.
     advice
-        What would separate the members of the class; None when it is alone.
+        What would separate the members of the class; for one that only the prior tells, what else could be.
     """
 
     code: str
@@ -122,6 +130,8 @@ def diagnose(
         chi2 = session.reported()
         message = unexplained("χ²", chi2, session.good.best.dof)
         findings = (Finding(message.code, message, (), chi2, None),)
+    elif not findings:
+        findings = _changed(session)
     return Diagnosis(findings, _not_excluded(session, explanations))
 
 
@@ -152,13 +162,47 @@ def _findings(session: Session, explanations: list[Explanation]) -> tuple[Findin
     )
 
 
+def _changed(session: Session) -> tuple[Finding, ...]:
+    """That a sound fit is not the gyro which the prior expects."""
+    prior, fitted = session.prior, session.good.fitted
+    if prior is None or fitted is None or fitted.dof < 1:
+        return ()
+    distance, compared = prior.distance(fitted.values, session.covariance(fitted), fitted.known)
+    if not compared or _chance_of(session, distance, compared, fitted.dof) > UNEXPLAINED_LEVEL:
+        return ()
+    message = far_from_prior(_differences(session, prior, fitted), distance, compared)
+    chi2 = session.reported() if session.told else None
+    return (Finding(message.code, message, (), chi2, None, {"distance": distance}),)
+
+
+def _differences(session: Session, prior: Prior, fitted: Fitted) -> str:
+    apart = prior.apart(fitted.values, session.covariance(fitted), fitted.known)
+    return differences(fitted.values - prior.values, apart)
+
+
+def _or_changed(session: Session, item: Explanation) -> Message | None:
+    """What a mistake that only the prior tells leaves to believe when it was none, where that can be believed."""
+    prior, fitted, distance = session.prior, session.good.fitted, session.good.distance
+    if item.code not in INVISIBLE or prior is None or fitted is None or distance is None:
+        return None
+    conceivable = distance < _CONCEIVABLE**2 * int(prior.says.sum())
+    return or_changed(_differences(session, prior, fitted)) if conceivable else None
+
+
+def _chance_of(session: Session, distance: float, compared: int, dof: int) -> float:
+    """Probability of such a D² of the gyro that the prior expects."""
+    if session.told:
+        return float(special.chdtrc(compared, distance))
+    return float(special.fdtrc(compared, dof, distance / compared))
+
+
 def _finding(session: Session, item: Explanation, others: list[Explanation], more: float) -> Finding:
     """A finding; `more` is what a result states as χ² beyond what the explanations start from."""
     observations = session.observations
     measure, before, after = item.fall
     message = verdict(item.code, observations, item.rows, item.details, (measure, before + more, after))
     details = dict(item.details)
-    advice = None
+    advice = _or_changed(session, item)
     if others:
         details["equivalents"] = tuple(
             {"code": other.code, "positions": _positions(observations, other.rows), **other.details}

@@ -7,7 +7,8 @@ normal. With z* the quantile of `PRIOR_LEVEL`, the threshold
 
     d > z*²  for Δ < z*;    2·z*·Δ − Δ²  for z* ≤ Δ < 2·z*;    0 beyond
 
-never gives more false alarms than that, however vague the prior, and loses nothing where it is sharp.
+never gives more false alarms than that, however vague the prior, and loses nothing where it is sharp. Where the
+gyro is far from its prior with the mistake put right too, it must besides be very much less far.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,7 +29,7 @@ from solver.blunders.hypotheses import (
     wrong_positions,
 )
 from solver.blunders.hypothesis_fit import UNTOLD
-from solver.blunders.hypothesis_score import Score, Session, Sum, discrete_threshold
+from solver.blunders.hypothesis_score import CLEAR_RATIO, Score, Session, Sum, discrete_threshold
 from solver.blunders.suspicion import Suspicion
 from solver.blunders.symmetries import Symmetry, approximate_symmetries, exact_symmetries
 from solver.records import Array
@@ -69,6 +70,8 @@ class Explanation:
         The same as a sentence shows it: χ², or the residuals' standard deviation, before and after.
     values, u : (8,) array or None
         Parameters with the data put right.
+    distance
+        D² from the prior with the data put right; None without prior or fit.
     """
 
     code: str
@@ -82,6 +85,7 @@ class Explanation:
     fall: tuple[str, float, float] = ("χ²", np.nan, np.nan)
     values: Array | None = None
     u: Array | None = None
+    distance: float | None = None
 
     @property
     def claim(self) -> tuple[Any, ...]:
@@ -123,14 +127,14 @@ def _explained(session: Session, score: Score, certain: str = "") -> Explanation
     sure = hypothesis.code == "channel-stuck" and details["channel"] in certain
     before, after = session.comparable(score)
     nearer = session.nearer(score)
-    apart = (session.good.distance or 0.0) if nearer else 0.0
-    squares = before.squares + apart, after.squares + apart - nearer
+    apart = (session.good.distance or 0.0, score.distance or 0.0) if nearer else (0.0, 0.0)
+    squares = before.squares + apart[0], after.squares + apart[1]
     measure = "χ² + D²" if nearer else "χ²"
     return Explanation(
         hypothesis.code, hypothesis.rows, details, session.total(score) - (_CERTAIN if sure else 0.0),
         session.gain(score) + nearer, sure or session.significant(score), *squares,
         (measure, *squares) if session.told else _scatters(before, after, by_currents=after is score.currents),
-        *_parameters(session, score),
+        *_parameters(session, score), score.distance,
     )  # fmt: skip
 
 
@@ -170,6 +174,7 @@ def invisible(session: Session) -> list[Explanation]:
         explained = _explained(session, score)
         if hypothesis.code in turned and session.nearer(score) > 0 and not explained.significant:
             threshold = min(discrete_threshold(hypothesis.members), thresholds.of(turned[hypothesis.code]))
+            threshold = max(threshold, _least_gain(session, score.distance))
             explained = replace(explained, significant=explained.gain > threshold)
         found.append(explained)
     return found
@@ -222,12 +227,20 @@ def _by_prior(session: Session, symmetry: Symmetry, thresholds: Thresholds) -> E
         u = np.sqrt(np.diagonal(covariance))
         if prior is not None:
             after = prior.distance(values, covariance, fitted.known)[0]
+    gain = 0.0 if prior is None else prior.cost(before) - prior.cost(after)
+    significant = gain > 0 and gain > _least_gain(session, after) and gain > thresholds.of(symmetry)
     misfit = session.good.best.squares if session.told else 0.0
     return Explanation(
-        symmetry.code, (), symmetry.details, 2.0 * float(np.log(len(INVISIBLE))) + after - before, before - after,
-        before > after and before - after > thresholds.of(symmetry), misfit + before, misfit + after,
-        ("χ² + D²" if session.told else "D²", misfit + before, misfit + after), values, u,
+        symmetry.code, (), symmetry.details, 2.0 * float(np.log(len(INVISIBLE))) - gain, gain, significant,
+        misfit + before, misfit + after,
+        ("χ² + D²" if session.told else "D²", misfit + before, misfit + after), values, u, after,
     )  # fmt: skip
+
+
+def _least_gain(session: Session, distance: float | None) -> float:
+    """What a mistake must gain at least where the gyro is far from its prior with the mistake put right too."""
+    fits = session.prior is None or distance is None or session.prior.fits(distance)
+    return 0.0 if fits else CLEAR_RATIO
 
 
 def _whole(session: Session, turned: Mapping[str, Symmetry]) -> list[tuple[Hypothesis, float]]:
@@ -249,7 +262,8 @@ def _whole(session: Session, turned: Mapping[str, Symmetry]) -> list[tuple[Hypot
             gain = max(good.best.dof, 0) * float(np.log((before + floor) / (square + floor)))
         if hypothesis.code in turned and session.prior is not None and good.fitted is not None:
             moved = turned[hypothesis.code].apply(good.fitted.values, session.covariance(good.fitted))
-            gain += (good.distance or 0.0) - session.prior.distance(*moved, good.fitted.known)[0]
+            gain += session.prior.cost(good.distance or 0.0)
+            gain -= session.prior.cost(session.prior.distance(*moved, good.fitted.known)[0])
         gains.append((hypothesis, gain))
     return gains
 

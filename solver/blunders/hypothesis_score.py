@@ -225,10 +225,10 @@ class Session:
         return good.dof * float(np.log((good.variance + floor) / (other.variance + floor)))
 
     def nearer(self, score: Score) -> float:
-        """By how much D² falls."""
-        if self.good.distance is None or score.distance is None:
+        """By how much D² falls, as it counts (`Prior.cost`)."""
+        if self.prior is None or self.good.distance is None or score.distance is None:
             return 0.0
-        return self.good.distance - score.distance
+        return self.prior.cost(self.good.distance) - self.prior.cost(score.distance)
 
     def total(self, score: Score) -> float:
         """T, by which hypotheses are ranked, beside that of good data."""

@@ -7,6 +7,10 @@ takes no part. The squared distance of a fit q̂ of covariance C from it,
     D² = (q̂ − q₀)ᵀ·(C₀ + C)⁻¹·(q̂ − q₀),
 
 over the parameters that both know, is what joint least squares over data and prior adds to χ².
+
+A prior can be wrong itself: the gyro has changed, or is another one. Then all hypotheses are far from it, and
+that one is less far than another says nothing. So explanations are compared by `Prior.cost`: D², or, where it is
+less, what D² comes to when the prior's spread is stretched to fit by one unknown factor.
 """
 
 from dataclasses import dataclass, field
@@ -20,6 +24,8 @@ from solver.records import PARAMETERS, Array
 
 COUPLING: Final = 0.2
 """Cross-coupling of a DTG's torquers, beside their scale factors: percents in practice, with room."""
+_STRETCHED: Final = 10.0
+"""Price of the unknown factor, as of any free unknown (`solver.blunders.hypothesis_score.OCCAM`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,3 +115,23 @@ class Prior:
         scale = np.sqrt(np.diagonal(both))
         distance = (apart / scale) @ np.linalg.solve(both / np.outer(scale, scale), apart / scale)
         return float(distance), len(compared)
+
+    def cost(self, distance: float) -> float:
+        """D² as explanations are compared by it.
+
+        With the prior's spread stretched by s, −2·ln of its density is m·ln s² + D²/s², least at s² = D²/m.
+        """
+        count = int(self.says.sum())
+        if distance <= count:
+            return distance
+        return min(distance, count * (1.0 + float(np.log(distance / count))) + _STRETCHED)
+
+    def fits(self, distance: float) -> bool:
+        """Whether D² counts as it is: without a stretched spread."""
+        return self.cost(distance) == distance
+
+    def apart(self, values: Array, covariance: Array, known: NDArray[np.bool_]) -> Array:
+        """Differences of a fit from what is expected in their standard uncertainties, (8,); NaN: not compared."""
+        u = np.sqrt(np.diagonal(self.matrix + covariance))
+        compared = self.says & known
+        return np.where(compared, (values - self.values) / np.where(compared, u, 1.0), np.nan)

@@ -3,11 +3,15 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+import numpy as np
+
 from solver.errors import Message
-from solver.records import Observations
+from solver.estimators.observability import UNITS, lab_units
+from solver.records import PARAMETERS, Array, Observations
 from solver.units import deg_from_rad, deg_per_h_from_rad_per_s, ma_from_ampere
 
 _MOST_NAMED: Final = 8
+_OFF: Final = 2.0
 
 
 def place(theta: float, psi: float, repeat: int = 0) -> str:
@@ -209,6 +213,44 @@ def unexplained(measure: str, value: float, expected: int) -> Message:
         "The misfit is far too large: %(measure)s is %(value)s where %(expected)d is expected, and no single mistake "
         "explains it. Look for several mistakes, or check the stated uncertainty of the currents.",
         {"measure": measure, "value": number(value), "expected": expected},
+    )
+
+
+def differences(of: Array, apart: Array) -> str:
+    """Name the parameters by which a gyro is not the one expected, in no language.
+
+    Parameters
+    ----------
+    of : (8,) array
+        Differences from what is expected, SI.
+    apart : (8,) array
+        The same in their standard uncertainties; NaN where nothing is expected.
+    """
+    size = np.nan_to_num(np.abs(apart))
+    return ", ".join(
+        f"{name} {value:+.4g} {UNITS[name]} ({u:.1f} u)"
+        for name, value, u in zip(PARAMETERS, lab_units(of), size, strict=True)
+        if u > max(_OFF, size.max() / 10)
+    )
+
+
+def far_from_prior(changes: str, distance: float, compared: int) -> Message:
+    """A gyro that is not the one expected, in a session without a mistake to explain it."""
+    return Message(
+        "far-from-prior",
+        "The gyro is not the one expected: %(changes)s; D² is %(distance)s where %(expected)d is expected, and no "
+        "mistake in the session explains it. Check that it is this gyro, the stand's latitude and the currents' "
+        "unit; if all that is right, the gyro has changed.",
+        {"changes": changes, "distance": number(distance), "expected": compared},
+    )
+
+
+def or_changed(changes: str) -> Message:
+    """What else could be where only a prior tells of a mistake."""
+    return Message(
+        "or-changed",
+        "Only the expectation tells: if the session is right as it is, the gyro has changed (%(changes)s).",
+        {"changes": changes},
     )
 
 

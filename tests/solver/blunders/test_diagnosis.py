@@ -15,7 +15,7 @@ from solver.blunders.diagnosis import Diagnosis, diagnose
 from solver.blunders.prior import Prior
 from solver.calibrate import calibrate
 from solver.inputs import CommonUncertainty
-from solver.records import Observations
+from solver.records import PARAMETERS, Observations
 from tests.solver import blundered
 from tests.solver.blundered import (
     INVISIBLE,
@@ -421,3 +421,37 @@ def test_the_gyro_far_from_its_prior_is_not_a_blunder():
     session = Study().draw(np.random.default_rng(1))
     session.gyro[:] = (NOMINAL + SPREAD * [6, 0, 0, 0, 0, 0, 0, 0]) * LAB
     assert not diagnose(good(session)[0], prior=prior()).findings
+
+
+@pytest.mark.parametrize("latitude", [55.76, 47.0, 5.0])
+def test_a_prior_that_does_not_fit_makes_no_mistake_of_the_session(latitude, rng):
+    """A gyro 30 times farther from a sharp prior than that says: near any prior, one mistake is nearer than none."""
+    spread = np.array([2.0, 2.0, 2.0, 2.0, 0.1, 0.1, 0.1, 0.1]) * LAB
+    for _ in range(10):
+        session = Study(latitude=latitude).draw(rng)
+        expected = Prior(session.gyro + 30 * spread * rng.choice([-1, 1], 8), spread)
+        diagnosis = diagnose(good(session)[0], prior=expected)
+        assert codes(diagnosis) == ["far-from-prior"]
+        changes = diagnosis.findings[0].message.values["changes"]
+        assert [part.split()[0] for part in changes.split(", ")] == list(PARAMETERS)
+        assert diagnosis.findings[0].details["distance"] == pytest.approx(8 * 30**2, rel=0.1)  # u of the fit
+
+
+def test_blunders_are_named_although_the_gyro_has_changed(rng):
+    """By three standard deviations of each parameter: a mistake that moves it much farther is a mistake still."""
+    for name in ("channels-swapped", "channel-sign", "current-unit"):
+        session = Study().draw(rng)
+        spread = np.array([20.0, 20.0, 20.0, 20.0, 1.0, 1.0, 1.0, 1.0]) * LAB
+        expected = Prior(session.gyro + 3 * spread * rng.choice([-1, 1], 8), spread)
+        made, truth = INVISIBLE[name](session)
+        assert right(diagnose(made, prior=expected), truth)
+
+
+def test_what_only_an_expectation_tells_says_what_else_could_be():
+    """Near 45° the complement is nearly no change: K by 7 % at 47°, as a gyro's own change could be."""
+    session = Study(latitude=47.0).draw(np.random.default_rng(3))
+    expected = Prior(session.gyro / [*[0.93] * 4, *[1.0] * 4], np.array([20.0] * 4 + [1.0] * 4) * LAB)
+    finding = diagnose(good(session)[0], prior=expected).findings[0]
+    assert finding.advice is not None
+    assert finding.advice.code == "or-changed"
+    assert "kx -" in finding.advice.values["changes"]
