@@ -113,8 +113,7 @@ class Instrument:
 
         def exchange(resource: "MessageBasedResource") -> str:
             self._send(resource, text)
-            line = resource.read_raw().decode("utf-8", "replace")
-            return line.removesuffix(self.connection.read_termination)
+            return self._line(resource).decode("utf-8", "replace")
 
         with self.lock:
             return self._attempt(exchange, text)
@@ -147,16 +146,25 @@ class Instrument:
         _require_open(resource)
         resource.write_raw((text + self.connection.write_termination).encode())
 
+    def _line(self, resource: "MessageBasedResource") -> bytes:
+        """A line without its end. One that is cut short is no answer."""
+        end, line = self.connection.read_termination.encode(), b""
+        while True:
+            _await(resource)
+            line += resource.read_raw()
+            if _stream_of(resource) is None or line.endswith(end):
+                return line.removesuffix(end)
+
     def _block(self, resource: "MessageBasedResource", text: str) -> bytes:
-        head = resource.read_bytes(2)
+        head = _exactly(resource, 2)
         if head[:1] != b"#" or not head[1:].isdigit() or head == b"#0":
             raise self._lost_with_garbage(text, head)
-        length = resource.read_bytes(int(head[1:]))
+        length = _exactly(resource, int(head[1:]))
         if not length.isdigit():
             raise self._lost_with_garbage(text, head + length)
-        content = resource.read_bytes(int(length)) if int(length) else b""
+        content = _exactly(resource, int(length))
         end = self.connection.read_termination.encode()
-        if end and resource.read_bytes(len(end)) != end:
+        if _exactly(resource, len(end)) != end:
             raise self._lost_with_garbage(text, b"\xe2\x80\xa6")
         return content
 
@@ -173,7 +181,7 @@ class Instrument:
             raise
         except (errors.Error, OSError) as error:
             late = getattr(error, "error_code", None) == constants.StatusCode.error_timeout
-            if late:
+            if late or isinstance(error, TimeoutError):
                 raise self._unanswered(text) from error
             self.close()
             raise self._lost(text, error) from error
@@ -202,6 +210,9 @@ class Instrument:
             raise TypeError(f"{resource.resource_class} takes no messages")
         resource.timeout = connection.timeout_s * _MS_PER_S
         resource.read_termination = connection.read_termination or None
+        if _stream_of(resource) is not None:
+            # What came before the other end closed is then given at once, and not at the timeout.
+            resource.set_visa_attribute(constants.ResourceAttribute.suppress_end_enabled, False)
         for name, value in connection.attributes.items():
             try:
                 resource.set_visa_attribute(getattr(constants, name), value)
@@ -273,6 +284,25 @@ def _manager(visa_library: str) -> "ResourceManager":
         return ResourceManager(visa_library)
 
 
+def _exactly(resource: "MessageBasedResource", count: int) -> bytes:
+    """Read so many bytes; raises as `_await`."""
+    got = bytearray()
+    while len(got) < count:
+        _await(resource)
+        got += resource.read_bytes(count - len(got), break_on_termchar=True)
+    return bytes(got)
+
+
+def _await(resource: "MessageBasedResource") -> None:
+    """Wait for more to read; raises `TimeoutError`, or as `_require_open` when the other end has closed."""
+    stream = _stream_of(resource)
+    if stream is None or _already_here(resource):
+        return
+    if not select.select([stream], [], [], resource.timeout / _MS_PER_S)[0]:
+        raise TimeoutError
+    _require_open(resource)
+
+
 def _require_open(resource: "MessageBasedResource") -> None:
     """Notice that the other end has closed: pyvisa-py would wait for its whole timeout, busily, for an answer.
 
@@ -281,12 +311,26 @@ def _require_open(resource: "MessageBasedResource") -> None:
     ConnectionError
         There is nobody at the other end any more.
     """
-    session = getattr(resource.visalib, "sessions", {}).get(resource.session)
-    stream = getattr(session, "interface", None)
-    if not isinstance(stream, socket.socket) or not select.select([stream], [], [], 0.0)[0]:
+    stream = _stream_of(resource)
+    if stream is None or not select.select([stream], [], [], 0.0)[0]:
         return
     if not stream.recv(1, socket.MSG_PEEK):
         raise ConnectionAbortedError("closed at the other end")
+
+
+def _stream_of(resource: "MessageBasedResource") -> socket.socket | None:
+    """The connection itself, where it is TCP and pyvisa-py's."""
+    stream = getattr(_session_of(resource), "interface", None)
+    return stream if isinstance(stream, socket.socket) else None
+
+
+def _already_here(resource: "MessageBasedResource") -> bool:
+    """Whether pyvisa-py has more of the answer than was asked for."""
+    return bool(getattr(_session_of(resource), "_pending_buffer", b""))
+
+
+def _session_of(resource: "MessageBasedResource") -> object:
+    return getattr(resource.visalib, "sessions", {}).get(resource.session)
 
 
 def _why(error: Exception) -> str:

@@ -1,11 +1,11 @@
 """A finished take judged on the spot, while it can still be measured again.
 
 Each check objects to a good record with a probability below `Thresholds.false_alarm`; the bounds stand where
-they are derived. A channel that is stuck or saturated is not judged further: whatever else its samples
-say follows from that.
+they are derived. A channel that is stuck or saturated is not judged further, nor is a record whose ammeter
+reports an overload: whatever else its samples say follows from that.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -129,11 +129,23 @@ def judged(
         return (_irregular(int(np.sum(np.diff(take.t_s) <= 0)), 0),)
     findings = list(_time(take.t_s, thresholds))
     channels = {"Jx": take.jx_ma, "Jy": take.jy_ma}
+    if take.overload:
+        return (*findings, *_overloaded(channels, thresholds.false_alarm / 2.0, largest_ma))
     for name, values in channels.items():
         findings += _channel(name, values, take.t_s, thresholds, expected, largest_ma)
-    if take.overload and not any(finding.code == "saturation" for finding in findings):
-        findings.append(_saturated_by_flag())
     return tuple(findings)
+
+
+def _overloaded(channels: Mapping[str, Array], false_alarm: float, largest_ma: float) -> list[Finding]:
+    """What an ammeter that reports an overload shows of it; what else its samples do follows from that.
+
+    Where neither channel is seen at a limit, which of them it is nobody can tell.
+    """
+    seen = [
+        _saturation(name, values, _beyond(values, largest_ma) or at_a_limit(values, false_alarm))
+        for name, values in channels.items()
+    ]
+    return [finding for finding in seen if finding] or [_OVERLOAD]
 
 
 def _time(t_s: Array, thresholds: Thresholds) -> Iterator[Finding]:
@@ -201,7 +213,7 @@ def _channel(
     false_alarm = thresholds.false_alarm / 2.0  # two channels
     # A channel that rests on one value is stuck even where that is its extreme; but the range's end says more.
     dead = (
-        _saturation(name, values, int(np.sum(np.abs(values) >= largest_ma * (1.0 - TOLERANCE))))
+        _saturation(name, values, _beyond(values, largest_ma))
         or _stuck(name, longest_run(values, false_alarm))
         or _saturation(name, values, at_a_limit(values, false_alarm))
     )
@@ -227,6 +239,17 @@ def _channel(
     yield from _signal(name, values[~off], t_s[~off], thresholds, expected)
 
 
+_OVERLOAD: Final = Finding(
+    "error",
+    Message("saturation", "The ammeter reports an overload. Choose a larger range and measure again."),
+)
+
+
+def _beyond(values: Array, largest_ma: float) -> int:
+    """How many samples are at the end of the ammeter's range as the station's file states it."""
+    return int(np.sum(np.abs(values) >= largest_ma * (1.0 - TOLERANCE)))
+
+
 def _saturation(name: str, values: Array, count: int) -> Finding | None:
     if not count:
         return None
@@ -238,13 +261,6 @@ def _saturation(name: str, values: Array, count: int) -> Finding | None:
             "range and measure again.",
             {"channel": name, "count": count, "value": float(values[np.argmax(np.abs(values))])},
         ),
-    )
-
-
-def _saturated_by_flag() -> Finding:
-    return Finding(
-        "error",
-        Message("saturation", "The ammeter reports an overload. Choose a larger range and measure again."),
     )
 
 

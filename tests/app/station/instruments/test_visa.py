@@ -72,16 +72,31 @@ def test_silence_is_told_with_what_was_asked_and_leaves_the_choice_to_the_caller
         instrument.close()
 
 
-@pytest.mark.parametrize("said", [b"", b"#3100abc"])
-def test_a_connection_cut_in_the_middle_is_lost_and_the_next_use_opens_another(said):
+@pytest.mark.parametrize("said", [b"", b"#", b"#3100", b"#3100abc"])
+def test_a_block_that_is_cut_is_told_as_such_at_once_and_the_next_use_opens_another(said):
+    """And not after the timeout, which is ten seconds."""
     with Peer((b"DATA?", Cut(said)), (b"DATA?", b"#13abc\n")) as peer:
-        instrument = of(peer, timeout_s=SHORT_S)
-        with pytest.raises(InstrumentLost):
+        instrument = of(peer, timeout_s=WAITS_S)
+        begun = time.monotonic()
+        with pytest.raises(InstrumentLost, match=r"broke at DATA\? \(closed at the other end\)"):
             instrument.ask_block("DATA?")
-        instrument.close()
+        assert time.monotonic() - begun < WAITS_S / 2
+        assert instrument.closed
         assert instrument.ask_block("DATA?") == b"abc"
         instrument.close()
     assert peer.clients == 2
+
+
+@pytest.mark.parametrize("said", [b"", b"12.3"])
+def test_a_line_that_is_cut_is_no_answer(said):
+    with Peer((b"AXIS:POS?", Cut(said)), (b"AXIS:POS?", b"12.34\n")) as peer:
+        instrument = of(peer, timeout_s=WAITS_S)
+        begun = time.monotonic()
+        with pytest.raises(InstrumentLost, match=r"broke at AXIS:POS\? \(closed at the other end\)"):
+            instrument.ask("AXIS:POS?")
+        assert time.monotonic() - begun < WAITS_S / 2
+        assert instrument.ask("AXIS:POS?") == "12.34"
+        instrument.close()
 
 
 def test_an_instrument_that_went_away_between_two_questions_is_lost_at_once():

@@ -176,6 +176,22 @@ def test_the_ammeters_own_flag_is_saturation_once():
     assert codes_of(changed(noise(), jx_ma=jx, overload=True)) == ["saturation"]
 
 
+def test_an_overload_is_told_as_such_and_as_nothing_else():
+    """The ammeter knows that its range is too small, however its samples look: stuck, leaping, noisy."""
+    bench = scenario("saturated").bench(1)
+    alike = Counter()
+    for place in PLACES:
+        take = take_of(bench, place)
+        cut = max(np.mean(np.abs(values) == np.abs(values).max()) for values in (take.jx_ma, take.jy_ma))
+        if cut > 0.005:
+            alike[codes_of(take) == ["saturation"]] += 1
+            assert set(codes_of(changed(take, overload=True))) == {"saturation"}
+    assert alike[False] > 0  # without the flag some look like something else
+    stuck = changed(noise(), jx_ma=np.full(12000, 0.002), overload=True)
+    (finding,) = judged(stuck, Thresholds(), largest_ma=1.0)
+    assert finding.message.text.startswith("The ammeter reports an overload.")
+
+
 def test_a_channel_with_one_value_is_stuck_and_not_judged_further():
     assert codes_of(changed(noise(), jy_ma=np.full(12000, 0.004))) == ["stuck"]
 
