@@ -20,7 +20,7 @@ from app.exchange.rows import CertificateRow
 from app.exchange.session_folder import SessionFiles
 from app.exchange.si import incomplete_uncertainties
 from app.exchange.uncertainties import read_uncertainties
-from app.services.solving import Stated, solved
+from app.services.solving import FEWEST_TRIALS, Stated, solved
 from solver.errors import Message
 
 
@@ -53,7 +53,11 @@ def solve(
         typer.Option("--prior", help="What the gyro is expected to be: parameters with u (JSON)."),
     ] = None,
     monte_carlo: Annotated[
-        str, typer.Option("--monte-carlo", help="Draws to propagate the distributions by, or adaptive.")
+        str,
+        typer.Option(
+            "--monte-carlo",
+            help="Draws to propagate the distributions by: 0 for none, from 10000 on, or adaptive.",
+        ),
     ] = "0",
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of these draws.")] = 0,
     as_json: Annotated[bool, typer.Option("--json", help="For programs: one JSON object per item.")] = False,
@@ -94,10 +98,12 @@ def _trials(text: str) -> int | None:
     """Number of draws; None for as many as are needed."""
     if text == "adaptive":
         return None
-    if not (text.isascii() and text.isdigit() and len(text) < 10):
-        raise Invalid(problem("bad-trials", "“%(text)s” is no number of draws. Give a whole number, or adaptive.",
-                              column="--monte-carlo", text=text[:40]))  # fmt: skip
-    return int(text)
+    trials = int(text) if text.isascii() and text.isdigit() and len(text) < 10 else -1
+    if trials and trials < FEWEST_TRIALS:
+        raise Invalid(problem("bad-trials", "“%(text)s” is no number of draws. Give 0 for none, a whole number from "
+                              "%(fewest)d on, or adaptive.", column="--monte-carlo", text=text[:40],
+                              fewest=FEWEST_TRIALS))  # fmt: skip
+    return trials
 
 
 def _prior(path: Path) -> dict[str, Any]:

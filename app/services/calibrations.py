@@ -14,7 +14,7 @@ from app.services.gyros import nominals_of
 from app.services.job_views import job_view
 from app.services.lab import Work
 from app.services.sessions import find_session, measurement_view, views
-from app.services.solving import Stated
+from app.services.solving import FEWEST_TRIALS, Stated
 from app.services.views import CalibrationView, JobView, Page, SessionView
 from app.store import measurement, results
 from app.store.tables import Calibration, CalibrationParameter, Measurement, MeasuringSession, StandAttitude
@@ -23,7 +23,6 @@ from solver.records import Method
 METHODS: Final = (*get_args(Method), "both")
 TRIALS: Final = 20_000
 """Monte Carlo draws of a calibration when nobody says otherwise: the ends of their intervals are good to 2 % of u."""
-FEWEST_TRIALS: Final = 10_000
 MOST_TRIALS: Final = 10_000_000
 
 

@@ -53,6 +53,8 @@ class Stated:
 
 TRIALS_FOR_TWO_DIGITS: Final = 1_000_000
 """From so many draws on they judge first order to two digits of u, with fewer to one (JCGM 101, 7.2.2)."""
+FEWEST_TRIALS: Final = 10_000
+"""With fewer draws the ends of a 95 % interval say nothing (JCGM 101, 7.2.2: many times 1/(1 − p))."""
 NOTHING: Final = Stated()
 
 

@@ -90,7 +90,8 @@ class NewCalibration(Incoming):
     monte_carlo: Annotated[
         Annotated[int, Field(strict=True, ge=0)] | Literal["adaptive"],
         Field(
-            description="Draws to propagate the distributions by: 0 for none, adaptive for as many as needed."
+            description="Draws to propagate the distributions by: 0 for none, from 10,000 on, or adaptive for as many "
+            "as are needed."
         ),
     ] = TRIALS
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63, description="Of these draws.")] = 0

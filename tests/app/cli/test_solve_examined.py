@@ -219,11 +219,14 @@ def test_a_bad_file_is_one_line_and_exit_code_2(driftbook, case, option, text, w
     assert words in done.err
 
 
-def test_no_number_of_draws_is_one_line(driftbook, case):
+@pytest.mark.parametrize("text", ["many", "1", "9999", "-1", "1e5"])
+def test_no_number_of_draws_is_one_line(driftbook, case, text):
+    """Fewer than 10,000 are refused, as in the laboratory: the ends of their intervals say nothing."""
     done = driftbook("solve", case / "currents.csv", "--certificate", case / "certificate.csv",
-                     "--latitude", LATITUDE_DEG, "--monte-carlo", "many")  # fmt: skip
+                     "--latitude", LATITUDE_DEG, "--monte-carlo", text)  # fmt: skip
     assert (done.code, len(done.err.strip().splitlines())) == (2, 1)
-    assert "many" in done.err
+    assert f"“{text}”" in done.err
+    assert "10000" in done.err
 
 
 def test_the_table_tells_of_the_diagnosis_and_the_draws(driftbook, case):
