@@ -58,8 +58,8 @@ def add_to_stand(name: Name, body: NewEvent, caller: Uploader) -> Event:
         return Event.model_validate(events.add(work, body.kind, body.happened_at, body.note, stand=name))
 
 
-@router.post("/events/{number}/withdrawal", responses={404: {}, 409: {}})
+@router.post("/events/{number}/withdrawal", responses={403: {}, 404: {}, 409: {}})
 def withdraw(number: Id, caller: Uploader) -> Event:
-    """Take back an event that was entered in error."""
+    """Take back an event that was entered in error; for whoever entered it, and for the roles that judge."""
     with caller.write() as work:
         return Event.model_validate(events.withdraw(work, number))

@@ -44,6 +44,8 @@ def _readable(name: str, value: Any) -> Any:
         return labels.unit(value)
     if name == "rule":
         return drift_labels.rule(value)
+    if name == "event":
+        return drift_labels.event(value)
     if name == "parameter" and value in labels.PARAMETER_NAMES:
         return labels.symbol_text(value)
     moment = _moment(value)

@@ -44,7 +44,7 @@ def add_to_stand(request: Request, person: Writer, lab: TheLab, name: str, sent:
 
 @router.post("/events/{number}/withdrawal")
 def withdraw(person: Writer, lab: TheLab, number: int, sent: Sent) -> Response:
-    """Take back an event that was entered in error."""
+    """Take back an event that was entered in error; for whoever entered it, and for the roles that judge."""
     with lab.write(person) as work:
         found = events.withdraw(work, number)
     wanted = sent.get("next")

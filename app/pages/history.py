@@ -75,7 +75,7 @@ def page(request: Request, person: Reader, lab: TheLab, serial: str, wanted: Wan
         bases=drift_tables.bases(found), trends=drift_tables.trends(found), latest=latest, due=holds,
         repeatability=drift_tables.repeatability(found), interval=(found.document or {}).get("interval"),
         judges=may_judge(person), may_write="upload" in person.scopes, now=now, today=now.date(), causes=CAUSES,
-        drift=drift_labels, words=drift_words, measured=measured,
+        drift=drift_labels, words=drift_words, measured=measured, may_withdraw=events.may_withdraw,
     )  # fmt: skip
 
 

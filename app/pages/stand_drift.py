@@ -10,7 +10,7 @@ from app.pages.base import Reader, TheLab, render
 from app.pages.fleet_view import ORDER
 from app.pages.tables import csv_answer, json_answer, parquet_answer
 from app.services import stands
-from app.services.drift import stand_reading
+from app.services.drift import events, stand_reading
 from app.services.drift.stand_rows import COLUMNS, rows
 
 router = APIRouter()
@@ -38,7 +38,7 @@ def page(
         common=stand_drift_view.common(found, parameter) if shown else None, rows=stand_drift_view.rows(found),
         groups=stand_reading.GROUPS, drift=drift_labels, whole=since is None and until is None,
         may_write="upload" in person.scopes, shown=_AFFECTED_SHOWN, most=stand_reading.MOST_POINTS,
-        size=stand_drift_words.size, between=stand_drift_words.between,
+        size=stand_drift_words.size, between=stand_drift_words.between, may_withdraw=events.may_withdraw,
     )  # fmt: skip
 
 

@@ -1,10 +1,11 @@
 """Alarms: raised once for each episode, kept up while it goes on, acknowledged by a person with a cause.
 
 A study gives its findings anew each time; `take_in` lays them against the alarms that are there. A finding
-belongs to an alarm of its parameter and kind that is open, or whose episode meets it in time; it then only
-moves the alarm's end on. A step belongs to the alarm of the step that may be the same one. What nothing shows any
-more ends: as replaced when the result that raised it counts no more, otherwise as lapsed. An alarm that a
-person acknowledged is never changed but for its end.
+belongs to an alarm of its parameter and kind whose episode meets it in time, and then moves the alarm's end on; what
+is true of the whole course, such as a trend, belongs to the open one. What nothing shows any more ends: as replaced
+when the result that raised it counts no more, otherwise as lapsed. Only a person ends an alarm for which an event
+was entered afterwards: whoever may enter events does not judge. An alarm that a person acknowledged is never changed
+but for its end.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,6 +16,7 @@ from typing import Any, Final
 from app.errors import Conflict, Invalid, NotFound, problem
 from app.exchange.si import PARAMETER_UNITS
 from app.services import access
+from app.services.drift.events import BREAKING
 from app.services.drift.views import AlarmView
 from app.services.lab import Work
 from app.store import drift
@@ -25,8 +27,8 @@ CAUSES: Final = ("gyro", "stand", "certificate", "operator", "environment", "rep
 SEVERITIES: Final = ("serious", "warning", "notice")
 _SERIOUS: Final = frozenset({"out-of-limits", "step", "beyond-limits"})
 _WARNING: Final = frozenset({"limit-ahead", "trend", "ewma", "cusum", "repeatability"})
-_SEPARATE: Final = frozenset({"step"})
-"""Kinds of which two may be open at once, as of a stand all: an open one takes in only what may be the same."""
+_LASTING: Final = frozenset({"limit-ahead", "trend", "repeatability"})
+"""Kinds that are said of the whole course: one of each is open at a time."""
 _LONGEST: Final = 4000
 
 
@@ -48,6 +50,8 @@ class Finding:
         What it was judged against; None when against nothing frozen.
     template, values
         Its sentence.
+    explained
+        An event that is known explains it: it raises no alarm, but one that stands goes on.
     """
 
     parameter: str | None
@@ -59,6 +63,7 @@ class Finding:
     template: str
     values: Mapping[str, Any]
     baseline: int | None = None
+    explained: bool = False
 
 
 def severity(kind: str) -> str:
@@ -82,7 +87,10 @@ def take_in(work: Work, study: DriftStudy, findings: Sequence[Finding], counting
     )
     shown: set[int] = set()
     for finding in sorted(findings, key=lambda item: item.since):
-        alarm = next((row for row in known if _is_same(row, finding, times)), None)
+        same = [row for row in known if _is_same(row, finding, times)]
+        alarm = next((row for row in same if row.state == "open"), same[0] if same else None)
+        if alarm is None and finding.explained:
+            continue
         if alarm is None:
             alarm = _raise(work, study, finding)
             known.append(alarm)
@@ -90,20 +98,21 @@ def take_in(work: Work, study: DriftStudy, findings: Sequence[Finding], counting
                 finding.calibration: datetime.fromisoformat(finding.since),
                 finding.last_calibration: datetime.fromisoformat(finding.until),
             }
-        elif alarm.id not in shown and alarm.state == "open":
+        elif alarm.state == "open":
             alarm.template, alarm.values = finding.template, dict(finding.values)
             alarm.baseline_id = finding.baseline
         if times[alarm.last_calibration_id] <= datetime.fromisoformat(finding.until):
             alarm.last_calibration_id = finding.last_calibration
             times[finding.last_calibration] = datetime.fromisoformat(finding.until)
         shown.add(alarm.id)
-    _end(work, [row for row in known if row.id not in shown and row.state == "open"], frozenset(counting))
+    unshown = [row for row in known if row.id not in shown and row.state == "open"]
+    _end(work, unshown, frozenset(counting), _entered(work, study))
 
 
 def _is_same(alarm: Alarm, finding: Finding, times: Mapping[int, datetime]) -> bool:
     if (alarm.parameter, alarm.kind) != (finding.parameter, finding.kind):
         return False
-    if alarm.state == "open" and alarm.kind not in _SEPARATE and not alarm.kind.startswith("stand-"):
+    if alarm.state == "open" and alarm.kind in _LASTING:
         return True
     since, until = datetime.fromisoformat(finding.since), datetime.fromisoformat(finding.until)
     return alarm.state in ("open", "acknowledged") and (
@@ -123,9 +132,23 @@ def _raise(work: Work, study: DriftStudy, finding: Finding) -> Alarm:
     return row
 
 
-def _end(work: Work, rows: Sequence[Alarm], counting: frozenset[int]) -> None:
+def _entered(work: Work, study: DriftStudy) -> datetime | None:
+    """When the last event was entered that may explain something of the subject."""
+    stands = (
+        [study.stand_id]
+        if study.stand_id is not None
+        else [stand.id for stand in drift.stands_of(work.db, study.gyro_id or 0)]
+    )
+    found = drift.events(work.db, study.gyro_id, stands)
+    return max((event.created_at for event in found if event.kind in BREAKING), default=None)
+
+
+def _end(work: Work, rows: Sequence[Alarm], counting: frozenset[int], entered: datetime | None) -> None:
     for row in rows:
-        row.state = "lapsed" if row.calibration_id in counting else "replaced"
+        counts = row.calibration_id in counting
+        if counts and entered is not None and entered > row.raised_at:
+            continue
+        row.state = "lapsed" if counts else "replaced"
         row.ended_at = work.now
 
 

@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from app.exchange.json_values import Json, finite
+from app.services.drift.events import BREAKING
 from app.services.drift.series import Column, SeriesTable, aware, iso, moment
 from app.services.drift.views import EventView
 from solver.drift.courses.course import describe
@@ -17,10 +18,9 @@ from solver.records import Array
 
 DAY: Final = 86_400.0
 YEAR: Final = 365.25 * DAY
-BREAKING: Final = frozenset({"repair", "adjustment", "moved", "method"})
-"""Events at which the level may change without being found."""
 LIKELY: Final = 0.05
 """A date of a step that is less probable does not count when an event is looked for that explains it."""
+_BESIDE: Final = ("stand", "certificate", "other", "solver")
 _MOMENTS: Final = 25
 HORIZON: Final = 2 * YEAR
 """How far ahead a forecast looks, s."""
@@ -45,17 +45,17 @@ class CourseStudy:
 def course_study(
     table: SeriesTable, parameter: str, events: Sequence[EventView], low: float | None, high: float | None
 ) -> CourseStudy:
-    """Describe a parameter that at least one session determined."""
+    """Describe a parameter that at least one session determined; `events`: entered, and told by the sessions."""
     places = table.determined(parameter)
     here = table.rows(places)
     history = table.history(parameter)
-    breaks = [_second(event) for event in events if event.kind in BREAKING]
-    course = describe(history, breaks)
+    happened = [event for event in events if _concerns(here, event)]
+    course = describe(history, [_second(event) for event in happened if event.kind in BREAKING])
     fitted, u_fitted = np.full(len(table), np.nan), np.full(len(table), np.nan)
     fitted[places], u_fitted[places] = course.fitted, course.u_fitted
     return CourseStudy(
         course,
-        tuple(_change(here, change, events) for change in course.changes),
+        tuple(_change(here, change, happened) for change in course.changes),
         tuple(
             {**_session(here, item.index), "size": item.size, "u": item.u, "p_value": item.p_value}
             for item in course.outliers
@@ -65,6 +65,12 @@ def course_study(
         fitted,
         u_fitted,
     )
+
+
+def _concerns(table: SeriesTable, event: EventView) -> bool:
+    """Whether it happened to the gyro, or to the stand of the session before it or of that after it."""
+    after = int(np.searchsorted(table["measured_at"], moment(event.at)))
+    return event.stand is None or event.stand in table["stand"][max(after - 1, 0) : after + 1]
 
 
 def _second(event: EventView) -> float:
@@ -79,20 +85,31 @@ def _session(table: SeriesTable, place: int) -> Json:
 
 
 def _change(table: SeriesTable, change: Change, events: Sequence[EventView]) -> Json:
-    """A change, its dates as sessions, and the event that lies at one of its likely dates."""
+    """A change, its dates as sessions, and what lies at its likely dates.
+
+    ``event`` and ``event_kind`` are of the one that explains it; ``beside`` is what happened then as well and explains
+    nothing by itself, the likelier first: another stand or certificate, a note, another version of the solver.
+    """
     times = table["measured_at"]
     per_year = YEAR if change.kind == "bend" else 1.0
     dates = change.dates or ((change.index, 1.0),)
     likely = [index for index, chance in dates if chance >= LIKELY] or [change.index]
     begin, end = times[max(likely[0] - 1, 0)], times[likely[-1]]
     between = [event for event in events if begin <= moment(event.at) <= end]
-    named = min(between, key=lambda event: abs(_second(event) - change.time), default=None)
+    between.sort(key=lambda event: abs(_second(event) - change.time))
+    named = next((event for event in between if event.kind in BREAKING), None)
+    beside = [event for event in between if event.kind not in BREAKING]
     return {
         "kind": change.kind, **_session(table, change.index),
         "before": iso(times[max(change.index - 1, 0)]), "since": iso(begin), "until": iso(end),
         "size": change.size * per_year, "u": change.u * per_year, "p_value": finite(change.p_value),
         "dates": [{"session": int(table["session"][index]), "probability": chance} for index, chance in dates],
         "event": None if named is None else named.id, "event_kind": None if named is None else named.kind,
+        "event_at": None if named is None else named.at.isoformat(),
+        "beside": [
+            {"kind": event.kind, "at": event.at.isoformat(), "note": event.note, "event": event.id}
+            for event in sorted(beside, key=lambda event: _BESIDE.index(event.kind))
+        ],
     }  # fmt: skip
 
 

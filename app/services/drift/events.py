@@ -7,10 +7,11 @@ from typing import Final
 import numpy as np
 
 from app.errors import Conflict, Invalid, NotFound, problem
+from app.services import access
 from app.services.drift import following
 from app.services.drift.series import SeriesTable, aware
 from app.services.drift.views import EventView
-from app.services.lab import Work
+from app.services.lab import Person, Work
 from app.services.lookup import find_gyro
 from app.services.stands import find_stand
 from app.store import drift
@@ -18,6 +19,8 @@ from app.store.tables import Event
 
 KINDS: Final = ("repair", "adjustment", "moved", "method", "other")
 """What a person may enter."""
+BREAKING: Final = frozenset({"repair", "adjustment", "moved", "method"})
+"""Those after which a level may be another one; they explain a step."""
 DERIVED: Final = ("certificate", "stand", "solver")
 """What the sessions tell: a certificate, a stand, a solver's version that differs from the session before."""
 _LONGEST: Final = 4000
@@ -60,8 +63,12 @@ def add(
 def withdraw(work: Work, event_id: int) -> EventView:
     """Take back an event that was entered in error; it stays to be seen.
 
+    Whoever entered it may, and whoever judges: an event explains steps and ends baselines.
+
     Raises
     ------
+    Forbidden
+        Somebody else entered it, and the person's role does not judge.
     NotFound
         There is none of that number.
     Conflict
@@ -72,9 +79,16 @@ def withdraw(work: Work, event_id: int) -> EventView:
         raise NotFound(problem("unknown-event", "There is no event %(number)d.", number=event_id))
     if row.withdrawn_at is not None:
         raise Conflict(problem("event-withdrawn", "This event was withdrawn already."))
+    if not may_withdraw(work.person, _named(work, row)):
+        access.require_judge(work.person)
     row.withdrawn_at, row.withdrawn_by = work.now, work.person.name
     _tell(work, row)
     return _named(work, row)
+
+
+def may_withdraw(person: Person, event: EventView) -> bool:
+    """Whether the person may take the event back."""
+    return "upload" in person.scopes and (person.name == event.created_by or person.role in access.JUDGES)
 
 
 def of_gyro(work: Work, serial: str, *, withdrawn: bool = False) -> tuple[EventView, ...]:

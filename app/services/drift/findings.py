@@ -1,15 +1,16 @@
 """What of a study a person has to be told: each finding with its first and last result, and its sentence.
 
 A finding is stated once for each episode: values that break a rule belong to one as long as no more than `GAP` values
-in between do not. Steps that an event explains, and trends and steps that are significant but not by much, are
-in the study and raise nothing: every new session is one more look at the same history, so that a level which is right
-for one look is not for all of them.
+in between do not. A step that an event explains raises nothing, but an alarm that stands goes on with it. Trends and
+steps that are significant but not by much are in the study only: every new session is one more look at the same
+history, so that a level which is right for one look is not for all of them.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from itertools import groupby
+from textwrap import shorten
 from typing import Any, Final
 
 import numpy as np
@@ -27,6 +28,8 @@ GAP: Final = 3
 LEVEL: Final = 0.001
 """Of the probability that chance alone makes a step or a trend, below which an alarm is raised: monthly looks over
 five years then raise a false one in a few per cent of histories."""
+_NOTE: Final = 120
+"""Letters of an event's note in a sentence."""
 AHEAD: Final = timedelta(days=365)
 """How far ahead of the last session a limit is looked for where no interval is stated."""
 
@@ -86,13 +89,26 @@ def episodes(signals: Sequence[Signal]) -> list[list[Signal]]:
 def _steps(table: SeriesTable, told: Told) -> Iterator[Finding]:
     for change in told.entry["changes"]:
         chance = change["p_value"]
-        if change["kind"] != "step" or change["event_kind"] is not None or chance is None or chance > LEVEL:
+        if change["kind"] != "step" or chance is None or chance > LEVEL:
             continue
         place = int(np.flatnonzero(table["calibration"] == change["calibration"])[0])
         values = {"unit": told.unit, "size": quantity(change["size"], change["u"], change=True),
                   "since": change["before"][:10], "day": change["at"][:10]}  # fmt: skip
-        found = _finding(table, told, "step", place, place, _STEP, values, None)
-        yield replace(found, since=change["since"], until=change["until"])
+        sentence, circumstances = _circumstances(change)
+        found = _finding(table, told, "step", place, place, sentence, values | circumstances, None)
+        yield replace(
+            found, since=change["since"], until=change["until"], explained=change["event_kind"] is not None
+        )
+
+
+def _circumstances(change: Json) -> tuple[Message, dict[str, Any]]:
+    """A step's sentence by what else happened then: what explains it before what only lies there."""
+    if change["event_kind"] is not None:
+        return _STEP_EXPLAINED, {"event": change["event_kind"], "happened": change["event_at"][:10]}
+    for item in change["beside"]:
+        note = shorten(item["note"], _NOTE, placeholder=" …") or "–"
+        return _STEP_BESIDE[item["kind"]], {"note": note, "happened": item["at"][:10]}
+    return _STEP, {}
 
 
 def _trend(table: SeriesTable, told: Told) -> Iterator[Finding]:
@@ -180,6 +196,30 @@ _CUSUM: Final = Message(
 _STEP: Final = Message(
     "step", "A step of %(size)s %(unit)s between %(since)s and %(day)s; no event explains it."
 )
+_STEP_EXPLAINED: Final = Message(
+    "step-explained",
+    "A step of %(size)s %(unit)s between %(since)s and %(day)s; entered for that time: %(event)s, %(happened)s.",
+)
+_STEP_BESIDE: Final = {
+    "stand": Message(
+        "step-stand",
+        "A step of %(size)s %(unit)s between %(since)s and %(day)s, when the gyro came to stand %(note)s.",
+    ),
+    "certificate": Message(
+        "step-certificate",
+        "A step of %(size)s %(unit)s between %(since)s and %(day)s, when its stand went over to certificate %(note)s.",
+    ),
+    "solver": Message(
+        "step-solver",
+        "A step of %(size)s %(unit)s between %(since)s and %(day)s, where solver %(note)s took over.",
+    ),
+    "other": Message(
+        "step-note",
+        "A step of %(size)s %(unit)s between %(since)s and %(day)s; the note of %(happened)s does not explain it: "
+        "“%(note)s”.",
+    ),
+}
+"""By what lies at a step's date and explains it no more than a person says."""
 _TREND: Final = Message("trend", "Drifts by %(slope)s %(unit)s a year since %(since)s.")
 _OUT: Final = Message("out-of-limits", "%(value)s %(unit)s lies outside the limits %(low)g to %(high)g.")
 _AHEAD: Final = Message(

@@ -74,10 +74,10 @@ def _arcsec(angle: float) -> float | None:
 
 
 def alarms(document: Json) -> Iterator[Finding]:
-    """What a person has to be told of the stand: changes that no event explains."""
+    """What a person has to be told of the stand: changes, also those that an event explains."""
     for item in document["findings"]:
         kind = _kind(item)
-        if kind is None or item["event"] is not None:
+        if kind is None:
             continue
         sentence = _UNCLEAR if item["verdict"] == "unclear" else _SENTENCES[kind]
         values: dict[str, Any] = {
@@ -89,7 +89,7 @@ def alarms(document: Json) -> Iterator[Finding]:
         }
         yield Finding(
             None, kind, item["calibration"], item["calibration"], item["since"], item["until"],
-            sentence.template, values,
+            sentence.template, values, explained=item["event"] is not None,
         )  # fmt: skip
 
 

@@ -1,13 +1,13 @@
 """A gyro's study by one method: what its parameters do over its life. Pure: columns in, a document out."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
 
 from app.exchange.json_values import Json
 from app.exchange.si import PARAMETER_UNITS
-from app.services.drift import charting, intervals
+from app.services.drift import charting, events, intervals
 from app.services.drift.alarms import Finding
 from app.services.drift.courses import course_study
 from app.services.drift.findings import AHEAD, Told, findings
@@ -67,8 +67,9 @@ def study(table: SeriesTable, known: Known) -> Studied:
     entries: dict[str, Json] = {}
     columns: dict[str, Column] = {}
     found: list[Finding] = []
+    happened = (*known.events, *events.derived(table, known.gyro))
     for name in PARAMETERS:
-        entries[name], more, told = _parameter(table, known, name)
+        entries[name], more, told = _parameter(table, known, name, happened)
         columns |= more
         found += told
     last = aware(table["measured_at"][-1]) if len(table) else None
@@ -81,7 +82,9 @@ def study(table: SeriesTable, known: Known) -> Studied:
     return Studied(document, table.with_columns(columns), tuple(found))
 
 
-def _parameter(table: SeriesTable, known: Known, name: str) -> tuple[Json, dict[str, Column], list[Finding]]:
+def _parameter(
+    table: SeriesTable, known: Known, name: str, happened: Sequence[EventView]
+) -> tuple[Json, dict[str, Column], list[Finding]]:
     """One parameter: its document entry, its charts' columns, its findings."""
     places = table.determined(name)
     low, high = known.limit(name, "low"), known.limit(name, "high")
@@ -89,7 +92,7 @@ def _parameter(table: SeriesTable, known: Known, name: str) -> tuple[Json, dict[
         return _nothing(name), charting.no_columns(table, name), []
     baselines = [item for item in known.baselines if item.parameter == name]
     charts = charting.charts(table, name, baselines, known.events)
-    course = course_study(table, name, known.events, low, high)
+    course = course_study(table, name, happened, low, high)
     entry: dict[str, Any] = {
         "unit": PARAMETER_UNITS[name][0],
         "latest": _latest(table, name, int(places[-1]), low, high),

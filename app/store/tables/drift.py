@@ -101,7 +101,7 @@ class Alarm(Base):
     `kind` names the rule or the finding; `calibration_id` is the result that raised it, `last_calibration_id` the
     last one that keeps it up. `template` and `values` are its sentence. `state` is open, acknowledged, replaced
     (the result that raised it counts no more: a correction replaced it) or lapsed (nothing shows it any
-    more: another baseline, an event that explains it); `ended_at` says since when it is not open.
+    more: another baseline, more results); `ended_at` says since when it is not open.
     """
 
     __tablename__ = "alarm"

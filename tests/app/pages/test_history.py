@@ -176,12 +176,15 @@ def test_alarms_stand_beside_and_can_be_answered_by_who_judges(
     assert "/acknowledgement" not in technician.get("/gyros/0417").text
 
 
-def test_events_can_be_withdrawn_and_derived_ones_cannot(technician: TestClient, results: list[int]) -> None:
-    page = technician.get("/gyros/0417").text
+def test_events_can_be_withdrawn_and_derived_ones_cannot(
+    technician: TestClient, quality: TestClient, results: list[int]
+) -> None:
+    page = quality.get("/gyros/0417").text
     text = section(page, "events")
     assert "Repair: torquer lead resoldered, R-118" in text
     assert "New certificate: C-17" in text
     assert page.count("/withdrawal") == 1
+    assert "/withdrawal" not in technician.get("/gyros/0417").text, "somebody else entered it"
 
 
 def test_a_step_that_no_event_explains_is_dated_and_named_by_its_size(

@@ -51,9 +51,9 @@ def revision(
     return row.id
 
 
-def session(work: Work, number: int, values: Values, **how: Any) -> int:
+def session(work: Work, number: int, values: Values, *, stand: str = "S1", **how: Any) -> int:
     """Open a session, one a month, each with a start of its own, and lay in its result; its number."""
-    new = NewSession("0417", "S1", new_start=True, started_at=BEGIN + number * MONTH)
+    new = NewSession("0417", stand, new_start=True, started_at=BEGIN + number * MONTH)
     session_id = open_session(work, new).id
     revision(work, session_id, values, **how)
     return session_id

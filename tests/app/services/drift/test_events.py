@@ -1,11 +1,12 @@
 """Events entered and withdrawn, and what the sessions themselves tell."""
 
+from contextlib import nullcontext
 from datetime import date, timedelta
 
 import pytest
-from laid import BEGIN, MONTH, TECHNICIAN, drawn, revision
+from laid import BEGIN, METROLOGIST, MONTH, TECHNICIAN, drawn, revision
 
-from app.errors import Conflict, Invalid, NotFound
+from app.errors import Conflict, Forbidden, Invalid, NotFound
 from app.exchange.rows import CertificateRow
 from app.services import stands
 from app.services.drift import events, reading
@@ -34,6 +35,18 @@ def test_an_event_withdrawn_is_hidden_but_kept(lab, history):
             events.withdraw(work, made.id)
         with pytest.raises(NotFound):
             events.withdraw(work, 99)
+
+
+@pytest.mark.parametrize(
+    ("enters", "withdraws", "allowed"),
+    [(METROLOGIST, TECHNICIAN, False), (TECHNICIAN, METROLOGIST, True), (TECHNICIAN, TECHNICIAN, True)],
+    ids=["anothers", "judge", "ones-own"],
+)
+def test_who_withdraws_an_event(lab, history, enters, withdraws, allowed):
+    with lab.write(enters) as work:
+        made = events.add(work, "repair", BEGIN, gyro="0417")
+    with lab.write(withdraws) as work, nullcontext() if allowed else pytest.raises(Forbidden):
+        events.withdraw(work, made.id)
 
 
 def test_the_sessions_tell_of_another_stand_certificate_and_solver(lab, history, follow_jobs):
