@@ -8,7 +8,7 @@ from fastapi.responses import JSONResponse
 from pydantic import Field
 
 from app.api.auth import Reader
-from app.api.pagination import TABLE_TOO, Columns, Listing, listed, tabular
+from app.api.pagination import TABLE_TOO, Columns, Listing, listed, tabular, wants_table
 from app.api.schemas.common import Incoming, Name, OptionalText, Since, Until
 from app.api.schemas.drift import By, ComponentLine, GyroDrift, Method, Replaced
 from app.services.drift import due, reading
@@ -53,18 +53,25 @@ class Wanted(Incoming):
     until: Annotated[Until, Field(alias="to", description="Not after this time or day.")] = None
     method: Method = "least-squares"
     by: Annotated[By, Field(description="What a point stands for.")] = "session"
-    points: Annotated[int, Field(ge=4, le=100_000, description="Most points of a parameter.")] = (
-        reading.MOST_POINTS
-    )
+    points: Annotated[
+        int | None,
+        Field(
+            ge=4,
+            le=100_000,
+            description="Most points of a parameter, and of those that broke a rule as many again; "
+            f"without it {reading.MOST_POINTS} in JSON, and all in CSV and Parquet.",
+        ),
+    ] = None
 
 
 @router.get("/gyros/{serial}/drift", response_model=GyroDrift, responses=TABLE_TOO | {404: {}})
 def over_time(serial: Name, wanted: Annotated[Wanted, Query()], caller: Reader, request: Request) -> Response:
     """A gyro's parameters over time: points with control charts, changes, trend, forecast, repeatability."""
+    most = wanted.points or (None if wants_table(request) else reading.MOST_POINTS)
     with caller.read() as work:
         found = reading.gyro_drift(
             work, serial, method=wanted.method, since=wanted.since, until=wanted.until, by=wanted.by,
-            parameters=PARAMETERS if wanted.parameter is None else [wanted.parameter], most=wanted.points,
+            parameters=PARAMETERS if wanted.parameter is None else [wanted.parameter], most=most,
         )  # fmt: skip
         holds = due.due_of(work, [serial])[serial]
     names = ["parameter", "unit", *_HEAD, *CHARTS, "signals"]

@@ -93,6 +93,11 @@ def wants_csv(request: Request) -> bool:
     return _preferred(request, "text/csv") == "text/csv"
 
 
+def wants_table(request: Request) -> bool:
+    """Whether CSV or Parquet is preferred over JSON."""
+    return _preferred(request, "text/csv", PARQUET) != "application/json"
+
+
 def tabular(
     request: Request, names: Sequence[str], rows: Callable[[], Sequence[Sequence[Cell]]]
 ) -> Response | None:

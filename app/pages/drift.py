@@ -30,6 +30,7 @@ router = APIRouter()
 _LARGE_PX: Final = 240
 _STATISTIC_PX: Final = 120
 _MOST_ROWS: Final = 50
+_STATISTICS: Final = ("moving_range", "ewma", "cusum_above", "cusum_below")
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +83,9 @@ def page(
         repaired = last_repair(events.of_gyro(work, serial))
         since, until = bounds(wanted, repaired, now)
         found = reading.gyro_drift(
-            work, serial, method=wanted.method, parameters=[parameter], since=since, until=until, by=wanted.by
-        )
+            work, serial, method=wanted.method, parameters=[parameter], since=since, until=until, by=wanted.by,
+            newest=_MOST_ROWS, statistics=_STATISTICS,
+        )  # fmt: skip
         known = alarms.alarms(work, gyro=serial, method=wanted.method, state=None)
     item = found.parameters[0]
     window = drift_panels.window_of(found, since, until, now)
@@ -93,11 +95,11 @@ def page(
         individuals=drift_panels.chart(found, item, window, height=_LARGE_PX),
         statistics=list(_statistics(found, item, window)), standing=drift_panels.status(item, known, window),
         alarms=[alarm for alarm in known if alarm.parameter == parameter],
-        bases=drift_tables.bases(replace(found, baselines=_own(found, parameter))), rows=_newest(item.points),
+        bases=drift_tables.bases(replace(found, baselines=_own(found, parameter))), rows=item.newest[::-1],
         trend=next(iter(drift_tables.trends(found)), None), repeatability=drift_tables.repeatability(found),
         judges=may_judge(person), now=now, causes=CAUSES, drift=drift_labels, words=drift_words,
         measured=figures.measured, columns=_columns(item),
-        broken=[point for point in _newest(item.points) if point.signals],
+        broken=item.broken[::-1],
     )  # fmt: skip
 
 
@@ -118,10 +120,6 @@ def _own(found: GyroDrift, parameter: str) -> tuple[Any, ...]:
     return tuple(line for line in found.baselines if line.parameter == parameter)
 
 
-def _newest(points: Sequence[DriftPoint]) -> list[DriftPoint]:
-    return list(reversed(points[-_MOST_ROWS:]))
-
-
 def _statistics(found: GyroDrift, item: ParameterDrift, window: Window) -> Iterator[Statistic]:
     """The charts beside the individuals', as far as a baseline makes them."""
     notes = {
@@ -131,13 +129,15 @@ def _statistics(found: GyroDrift, item: ParameterDrift, window: Window) -> Itera
     for name, (title, note) in notes.items():
         points = _plotted(item, window, name, name)
         if points:
-            stretches = drift_panels.stretches(item, found.baselines, window, name)
+            stretches = drift_panels.stretches(
+                item.parameter, item.statistics[name], found.baselines, window, name
+            )
             yield Statistic(name, title, note, _spec(points, stretches, window, title, last=False))
     above, below = (_plotted(item, window, f"cusum_{side}", "cusum") for side in ("above", "below"))
     if above or below:
-        limits = [
-            _both_sides(line) for line in drift_panels.stretches(item, found.baselines, window, "cusum")
-        ]
+        shown = item.statistics["cusum_above"]
+        lines = drift_panels.stretches(item.parameter, shown, found.baselines, window, "cusum")
+        limits = [_both_sides(line) for line in lines]
         note = gettext("cumulative sums of the standardised values, up above zero, down below it")
         yield Statistic(
             "cusum", "CUSUM", note, _spec([*above, *_falling(below)], limits, window, "CUSUM", last=True)
@@ -171,8 +171,7 @@ def _plotted(item: ParameterDrift, window: Window, column: str, rule: str) -> li
             point.at, point.charts[column] or 0.0, None, "beyond" if rule in point.signals else "within",
             _named(point, point.charts[column]), "", drift_panels.href(point), window.part(point.at),
         )
-        for point in item.points
-        if point.charts.get(column) is not None
+        for point in item.statistics.get(column, ())
     ]  # fmt: skip
 
 
@@ -197,7 +196,7 @@ class Column:
 
 
 def _columns(item: ParameterDrift) -> list[Column]:
-    known = {name for point in item.points for name, value in point.charts.items() if value is not None}
+    known = {name for point in item.newest for name, value in point.charts.items() if value is not None}
     return [
         Column(name, gettext(title), decimals)
         for name, title, decimals in (

@@ -92,7 +92,7 @@ def chart(
         list(_limits(item)),
         (window.begin, window.end),
         _description(found, item),
-        stretches=stretches(item, found.baselines, window, "individuals"),
+        stretches=stretches(item.parameter, item.points, found.baselines, window, "individuals"),
         changes=_steps(study, item, window),
         forecast=_forecast(study, window),
         today=_today(window, named=named),
@@ -182,17 +182,17 @@ def _span(at: datetime, text: str, window: Window, length_days: float) -> tuple[
 
 
 def stretches(
-    item: ParameterDrift, baselines: Sequence[BaselineView], window: Window, name: str
+    parameter: str, points: Sequence[DriftPoint], baselines: Sequence[BaselineView], window: Window, name: str
 ) -> list[plots.ControlStretch]:
     """Limits of a chart, one stretch for each baseline and not across a repair."""
     known = sorted(
-        (line for line in baselines if line.parameter == item.parameter), key=lambda line: line.valid_from
+        (line for line in baselines if line.parameter == parameter), key=lambda line: line.valid_from
     )
     borders = sorted({*(line.valid_from for line in known), *window.breaks})
     edges = [window.begin, *(border for border in borders if window.begin < border < window.end), window.end]
     made = []
     for begin, end in pairwise(edges):
-        inside = [point for point in item.points if begin <= point.at < end and _drawn(point, name)]
+        inside = [point for point in points if begin <= point.at < end and _drawn(point, name)]
         if inside:
             # A mean has limits over what was measured; the last baseline's go on, for what comes is judged by it.
             made.append(_stretch(inside, name, begin, end))

@@ -16,7 +16,7 @@ from app.services import access, gyros, stands
 from app.services.drift import series
 from app.services.lab import Lab, Work
 from app.services.sessions import NewSession, find_session, open_session
-from app.store import equipment
+from app.store import drift, equipment
 from app.store.tables import Alarm, Baseline, Calibration, CalibrationParameter, DriftStudy, Event
 from solver.records import PARAMETERS
 
@@ -255,6 +255,38 @@ def studied_laboratory(lab: Lab, now: datetime | None = None) -> list[int]:
         judge(work, at, results)
         lay_study(work, at)
     return results
+
+
+def long_series(table: series.SeriesTable, count: int) -> series.SeriesTable:
+    """A studied history of `count` sessions, an hour apart, with weighted averages.
+
+    Sessions are numbered from one; values scatter, every fiftieth of ω0x breaks a rule and lies in the middle.
+    """
+    drawn = np.random.default_rng(11)
+    numbers = np.arange(count)
+    last = table["measured_at"][-1]
+    made = {name: np.repeat(column[-1:], count) for name, column in table.columns.items()}
+    made |= dict.fromkeys(("session", "calibration", "start"), numbers + 1)
+    made |= {"measured_at": last - (count - 1 - numbers) * np.timedelta64(1, "h")}
+    for name in PARAMETERS:
+        made[f"{name}.value"] = CENTRE[name] + drawn.normal(0.0, U[name], count)
+        made[f"{name}.ewma"] = CENTRE[name] + drawn.normal(0.0, U[name] / 3.0, count)
+        made[f"{name}.signals"] = np.full(count, "", object)
+    made["w0x.value"][25::50] = CENTRE["w0x"]
+    made["w0x.signals"][25::50] = "nelson-2"
+    return series.SeriesTable(made)
+
+
+def lengthen(work: Work, count: int) -> series.SeriesTable:
+    """Give the study of 0417 so many sessions."""
+    gyro = equipment.gyro(work.db, "0417")
+    assert gyro is not None
+    row = drift.study(work.db, gyro.id, None, "least-squares")
+    assert row is not None
+    assert row.series is not None
+    table = long_series(series.decode(row.series), count)
+    row.series = series.encode(table)
+    return table
 
 
 def results_of(work: Work) -> list[int]:

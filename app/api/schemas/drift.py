@@ -184,7 +184,7 @@ class ParameterDrift(Outgoing):
     """A parameter over a period, and what was found of it over the gyro's whole life (`study`).
 
     `sessions` of the period determined it; with `reduced` the points are the lowest and the highest of
-    equal spans of time.
+    equal spans of time, of all and of those that broke a rule.
     """
 
     parameter: str

@@ -85,11 +85,20 @@ def _external(value: Array, weight: Array, mean: float) -> float:
     return sqrt(squares / ((len(value) - 1) * float(np.sum(weight))))
 
 
-def reduced(table: SeriesTable, parameter: str, most: int) -> NDArray[np.int64]:
-    """Rows that show a parameter in at most `most` points, four at the least; see `extremes`."""
-    places = table.determined(parameter)
+def reduced(table: SeriesTable, parameter: str, most: int, statistic: str = "value") -> NDArray[np.int64]:
+    """Rows that show a column of a parameter in few points, and where rules were broken.
+
+    At most `most` of all by their `extremes`, four at the least; and of those that broke a rule as many again.
+    """
+    places = np.flatnonzero(np.isfinite(table[f"{parameter}.{statistic}"]))
+    broken = places[np.isin(places, table.broken(parameter))]
+    parts = [_spread(table, some, f"{parameter}.{statistic}", most) for some in (places, broken)]
+    return np.union1d(*parts)
+
+
+def _spread(table: SeriesTable, places: NDArray[np.int64], name: str, most: int) -> NDArray[np.int64]:
     times = table["measured_at"][places].astype(np.int64)
-    kept: NDArray[np.int64] = places[extremes(times, table[f"{parameter}.value"][places], most)]
+    kept: NDArray[np.int64] = places[extremes(times, table[name][places], most)]
     return kept
 
 

@@ -7,11 +7,12 @@ from itertools import repeat
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.errors import Invalid, problem
 from app.exchange.json_values import Json
 from app.exchange.si import PARAMETER_UNITS
-from app.services.drift import alarms, baselines, events, grouping, series
+from app.services.drift import alarms, baselines, events, grouping, series, type_intervals
 from app.services.drift.charting import CHARTS
 from app.services.drift.series import SeriesTable, aware
 from app.services.drift.views import (
@@ -47,6 +48,7 @@ def gyro_drift(
     by: str = "session",
     most: int | None = MOST_POINTS,
     newest: int = 0,
+    statistics: Sequence[str] = (),
 ) -> GyroDrift:
     """A gyro's drift by one method: what was found, and the points of a period.
 
@@ -59,9 +61,11 @@ def gyro_drift(
     by
         What a point stands for: session, start, day, month or year.
     most
-        Points of each parameter at the most; None for all.
+        Points of each parameter at the most, and of those that broke a rule as many again; None for all.
     newest
-        Of how many of the newest sessions every value is wanted as well.
+        Of how many of the newest sessions, and of the newest that broke a rule, every value is wanted as well.
+    statistics
+        Columns of the charts (`charting.CHARTS`) of which as few points are wanted as well.
 
     Raises
     ------
@@ -77,6 +81,8 @@ def gyro_drift(
     made = row is not None and row.document is not None
     table = series.decode(row.series) if row is not None and row.series is not None else None
     document = json.loads(row.document) if row is not None and row.document is not None else None
+    if document is not None:
+        document = type_intervals.document_by_type(work, gyro.type, method, document)
     shown = None if table is None else table.between(since, until)
     found = [] if shown is None else [*events.derived(shown, serial)]
     found += [
@@ -92,7 +98,9 @@ def gyro_drift(
         since=None if not made or table is None or not len(table) else aware(table["measured_at"][0]),
         until=None if not made or table is None or not len(table) else aware(table["measured_at"][-1]),
         document=document,
-        parameters=tuple(_parameter(gyro, name, shown, document, by, most, newest) for name in parameters),
+        parameters=tuple(
+            _parameter(gyro, name, shown, document, by, most, newest, statistics) for name in parameters
+        ),
         events=tuple(sorted(found, key=lambda item: item.at)),
         baselines=baselines.of_gyro(work, serial, method=method),
         alarms=alarms.alarms(work, gyro=serial, method=method),
@@ -176,15 +184,25 @@ def _parameter(
     by: str,
     most: int | None,
     newest: int,
+    statistics: Sequence[str],
 ) -> ParameterDrift:
     limits = next((item for item in gyro.type.limits if item.parameter == name), None)
     low, high = (limits.low, limits.high) if limits else (None, None)
-    places = np.array([], np.int64) if table is None else table.determined(name)
-    points: list[DriftPoint] = []
+    places, broken = (
+        (np.array([], np.int64),) * 2 if table is None else (table.determined(name), table.broken(name))
+    )
+
+    def at(which: NDArray[np.int64]) -> tuple[DriftPoint, ...]:
+        return () if table is None else tuple(_points(table.rows(which), name, low, high))
+
+    points: Sequence[DriftPoint] = ()
+    drawn: dict[str, tuple[DriftPoint, ...]] = {}
     whole = len(places)
     if table is not None and by == "session":
-        kept = places if most is None else grouping.reduced(table, name, most)
-        points = list(_points(table.rows(kept), name, low, high))
+        few = len(places) if most is None else most
+        points = at(grouping.reduced(table, name, few))
+        known = [column for column in statistics if f"{name}.{column}" in table]
+        drawn = {column: at(grouping.reduced(table, name, few, column)) for column in known}
     elif table is not None:
         points = list(_groups(table, name, by, low, high))
         whole = len(points)
@@ -192,9 +210,9 @@ def _parameter(
     return ParameterDrift(
         parameter=name, unit=PARAMETER_UNITS[name][0], low=low, high=high,
         repeatability=limits.repeatability if limits else None, sessions=len(places),
-        reduced=len(points) < whole, points=tuple(points),
-        newest=() if table is None else tuple(_newest(table, name, low, high, newest)),
-        study=None if document is None else document["parameters"].get(name),
+        reduced=len(points) < whole, points=tuple(points), statistics=drawn,
+        newest=at(places[max(0, len(places) - newest) :]), broken=at(broken[max(0, len(broken) - newest) :]),
+        breaking=len(broken), study=None if document is None else document["parameters"].get(name),
     )  # fmt: skip
 
 
@@ -202,13 +220,6 @@ def _fewer(points: list[DriftPoint], most: int) -> list[DriftPoint]:
     times = np.array([round(point.at.timestamp()) for point in points], np.int64)
     values = np.array([point.value for point in points], np.float64)
     return [points[place] for place in grouping.extremes(times, values, most)]
-
-
-def _newest(
-    table: SeriesTable, name: str, low: float | None, high: float | None, count: int
-) -> Iterator[DriftPoint]:
-    last = table.rows(slice(max(0, len(table) - count), None))
-    return _points(last.rows(last.determined(name)), name, low, high)
 
 
 def _points(table: SeriesTable, name: str, low: float | None, high: float | None) -> Iterator[DriftPoint]:

@@ -85,6 +85,11 @@ class SeriesTable:
         """Places of the sessions that determined the parameter."""
         return np.flatnonzero(np.isfinite(self.columns[f"{parameter}.value"]))
 
+    def broken(self, parameter: str) -> NDArray[np.int64]:
+        """Places of the sessions that stand in a pattern that breaks a rule; none before a study."""
+        name = f"{parameter}.signals"
+        return np.flatnonzero(self.columns[name] != "") if name in self else np.array([], np.int64)
+
     def noise(self, parameter: str) -> Array:
         """What differs from session to session by the currents' noise; 0 where it is not known."""
         known: Array = np.nan_to_num(self.columns[f"{parameter}.u_noise"], nan=0.0)

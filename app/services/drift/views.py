@@ -211,8 +211,11 @@ class ParameterDrift:
         Limits of the type: for the value, and for its standard deviation from session to session.
     sessions
         How many sessions of the period determined it; `points` may be fewer, `reduced` says so.
-    newest
-        Of the newest sessions of the period one point each, as many as were asked for, whatever `points` are.
+    statistics
+        By the name of a chart's column, of those that were asked for, the points that show it in as few.
+    newest, broken
+        Of the newest sessions of the period, and of the newest that broke a rule, one point each, as many as were
+        asked for, whatever `points` are; `breaking` is how many broke one.
     study
         What was found of it over its whole life (the document's entry); None before the first study.
     """
@@ -225,7 +228,10 @@ class ParameterDrift:
     sessions: int
     reduced: bool
     points: tuple[DriftPoint, ...]
+    statistics: Mapping[str, tuple[DriftPoint, ...]]
     newest: tuple[DriftPoint, ...]
+    broken: tuple[DriftPoint, ...]
+    breaking: int
     study: Mapping[str, Any] | None
 
 

@@ -3,6 +3,7 @@
 import io
 from datetime import UTC, datetime, timedelta
 
+import drift_laboratory
 import pyarrow.parquet as pq
 import pytest
 from serving import Service, ready
@@ -99,6 +100,21 @@ def test_a_period_a_grouping_and_fewer_points(judge):
     fewer = points(points=4)
     assert 1 < len(fewer["points"]) <= 4
     assert (fewer["sessions"], fewer["reduced"]) == (12, True)
+
+
+def test_files_hold_every_session(judge, service):
+    """JSON gives so many as a chart shows, and says so."""
+    with service.lab.write(access.SYSTEM) as work:
+        drift_laboratory.lengthen(work, 150)
+    (drift,) = judge.get("/gyros/0417/drift", params={"parameter": "w0y"}).json()["parameters"]
+    assert (drift["sessions"], drift["reduced"]) == (150, True)
+    for wanted, count in (({}, 150), ({"points": 4}, 4)):
+        answer = judge.get(
+            "/gyros/0417/drift", params={"parameter": "w0y"} | wanted, headers={"accept": "text/csv"}
+        )
+        assert 1 < len(answer.text.splitlines()) - 1 <= count
+    whole = judge.get("/gyros/0417/drift", params={"parameter": "w0y"}, headers={"accept": "text/csv"})
+    assert [int(row.split(",")[10]) for row in whole.text.splitlines()[1:]] == list(range(1, 151))
 
 
 @pytest.mark.parametrize(

@@ -109,6 +109,42 @@ def test_the_values_with_their_statistics_as_a_file(technician: TestClient, real
     assert technician.get("/gyros/0417/drift/w0y.parquet").content[:4] == b"PAR1"
 
 
+def test_a_long_history_is_whole_in_tables_files_and_what_broke_a_rule(
+    technician: TestClient, lab: Lab
+) -> None:
+    with lab.write(access.SYSTEM) as work:
+        table = drift_laboratory.lengthen(work, 1000)
+    page = technician.get("/gyros/0417/drift/w0x?period=all").text
+    rows = re.search(r'aria-labelledby="table".*', page, re.DOTALL)
+    broken = re.search(r'aria-labelledby="rules".*?</section>', page, re.DOTALL)
+    assert rows
+    assert broken
+    assert re.findall(r'href="/sessions/(\d+)"', rows[0])[:50] == [str(1000 - n) for n in range(50)]
+    assert "50 of 1000" in text(rows[0])
+    assert re.findall(r'href="/results/(\d+)"', broken[0]) == [str(number) for number in range(976, 0, -50)]
+    individuals, average = (
+        {int(row["href"].rpartition("/")[2]): row["v"] for row in rows}
+        for rows in ([*spec["datasets"]["within"], *spec["datasets"]["beyond"]] for spec in charts(page))
+    )
+    assert set(range(26, 1001, 50)) <= set(individuals)
+    assert len(individuals) < 200
+    for found, column in ((individuals, "w0x.value"), (average, "w0x.ewma")):
+        assert {min(found.values()), max(found.values())} == {table[column].min(), table[column].max()}
+    assert "those that broke a rule; the files hold every one" in text(page)
+    file = technician.get("/gyros/0417/drift/w0x.csv?period=all").text
+    assert len(file.splitlines()) == 1001
+
+
+def test_of_many_broken_rules_the_newest_are_listed(technician: TestClient, lab: Lab) -> None:
+    with lab.write(access.SYSTEM) as work:
+        drift_laboratory.lengthen(work, 5000)
+    page = technician.get("/gyros/0417/drift/w0x?period=all").text
+    broken = re.search(r'aria-labelledby="rules".*?</section>', page, re.DOTALL)
+    assert broken
+    assert "the newest first, 50 of 100" in text(broken[0])
+    assert broken[0].count("<dt") == 50
+
+
 def test_means_have_no_control_charts(technician: TestClient) -> None:
     page = technician.get("/gyros/0417/drift/w0y?period=all&by=year").text
     assert len(charts(page)) == 1

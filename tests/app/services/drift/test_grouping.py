@@ -82,3 +82,30 @@ def test_nothing_determined_gives_no_group():
     table = _table([BEGIN], [np.nan], [1.0])
     assert list(grouped(table, "month", "w0x")) == []
     assert aware(table["measured_at"][0]) == BEGIN
+
+
+def test_what_broke_a_rule_is_shown_and_each_statistic_by_its_own_extremes():
+    """One in a hundred broke a rule, in the middle of what the others do; the averages peak elsewhere."""
+    draw = np.random.default_rng(4)
+    times = [BEGIN + timedelta(hours=n) for n in range(4_000)]
+    values, average = draw.normal(size=4_000), draw.normal(size=4_000)
+    average[[77, 3_456]] = (9.0, np.nan)
+    broken = np.arange(50, 4_000, 100)
+    values[broken] = 0.0
+    signals = np.full(4_000, "", object)
+    signals[broken] = "nelson-2"
+    table = _table(times, values, np.ones(4_000)).with_columns({"w0x.ewma": average, "w0x.signals": signals})
+    kept = set(reduced(table, "w0x", 60).tolist())
+    assert set(broken.tolist()) <= kept
+    assert len(kept) <= 60 + len(broken)
+    assert 77 not in kept
+    other = set(reduced(table, "w0x", 60, "ewma").tolist())
+    assert {77, *broken.tolist()} <= other
+    assert 3_456 not in other
+
+
+def test_where_nearly_all_break_a_rule_they_are_reduced_too():
+    times = [BEGIN + timedelta(hours=n) for n in range(4_000)]
+    table = _table(times, np.arange(4_000.0), np.ones(4_000))
+    table = table.with_columns({"w0x.signals": np.full(4_000, "ewma", object)})
+    assert len(reduced(table, "w0x", 60)) <= 120
