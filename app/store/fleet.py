@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
@@ -106,6 +106,17 @@ def studies_of(db: Session, gyro_ids: Sequence[int], method: str) -> Sequence[St
     return [
         Studied(gyro_id, document, bool(fresh)) for gyro_id, document, fresh in rows if gyro_id is not None
     ]
+
+
+def recalibrations(db: Session, type_id: int, method: str) -> Sequence[dict[str, Any]]:
+    """What was found at the end of intervals, of each gyro of a type of which anything was."""
+    rows = db.scalars(
+        sa.select(DriftStudy.recalibrations)
+        .join(Gyro, Gyro.id == DriftStudy.gyro_id)
+        .where(Gyro.type_id == type_id, DriftStudy.method == method)
+        .order_by(Gyro.serial)
+    )
+    return [row for row in rows if row is not None]
 
 
 def open_alarms(db: Session, gyro_ids: Sequence[int], method: str) -> Mapping[int, int]:

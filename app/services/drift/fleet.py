@@ -1,17 +1,18 @@
 """All gyros of a type: where each stands, where it goes, how it repeats, and what they have in common.
 
 Values are those of each gyro's last sound calibration (`due`); drift rates, repeatability and recommended
-intervals come from the stored studies, so that the cost does not grow with the length of histories.
+intervals come from the stored studies, so that the cost does not grow with the length of histories; the intervals
+with the advice of all the type's calibrations (`type_intervals`).
 """
 
 import json
 from collections.abc import Mapping, Sequence
-from statistics import median
+from statistics import median_low
 from typing import Any, Final
 
 from app.errors import NotFound, problem
 from app.services import verdicts
-from app.services.drift import due, fleet_statistics
+from app.services.drift import due, fleet_statistics, intervals, type_intervals
 from app.services.drift.due import Due
 from app.services.drift.fleet_views import Fleet, FleetGyro, Standing, TypeInterval
 from app.services.lab import Work
@@ -20,6 +21,7 @@ from app.store import equipment
 from app.store import fleet as stored
 from app.store.fleet import Studied
 from app.store.tables import Calibration
+from solver.drift.recalibrating.recalibration import MethodAdvice
 
 METHOD: Final = "least-squares"
 Document = Mapping[str, Any]
@@ -42,10 +44,11 @@ def fleet(work: Work, type_name: str) -> Fleet:
     alarms = stored.open_alarms(work.db, list(ids.values()), METHOD)
     results = stored.results_of(work.db, [item.calibration for item in holds if item.calibration is not None])
     documents = {key: json.loads(row.document) for key, row in studies.items() if row.document is not None}
+    advice = type_intervals.advice(work, kind, METHOD)
     gyros = tuple(
         _gyro(
             item, results.get(item.calibration or 0), documents.get(ids[item.gyro], {}),
-            alarms=alarms.get(ids[item.gyro], 0), study=studies.get(ids[item.gyro]),
+            alarms=alarms.get(ids[item.gyro], 0), study=studies.get(ids[item.gyro]), advice=advice,
         )
         for item in sorted(holds, key=lambda item: item.gyro)
     )  # fmt: skip
@@ -59,11 +62,12 @@ def fleet(work: Work, type_name: str) -> Fleet:
 
 
 def _gyro(
-    holds: Due, result: Calibration | None, document: Document, *, alarms: int, study: Studied | None
-) -> FleetGyro:
+    holds: Due, result: Calibration | None, document: Document, *, alarms: int, study: Studied | None,
+    advice: MethodAdvice | None,
+) -> FleetGyro:  # fmt: skip
     found = verdicts.summary(result) if result else None
     views = found.parameters if found else {}
-    interval = document.get("interval") or {}
+    interval = intervals.by_type(document.get("interval") or {}, advice)
     return FleetGyro(
         due=holds, verdict=found.verdict if found else None,
         parameters={
@@ -96,4 +100,4 @@ def _interval(stated: int | None, gyros: Sequence[FleetGyro]) -> TypeInterval:
     if not days:
         return TypeInterval(stated, None, None, None, 0)
     shortest = min(days, key=lambda serial: days[serial])
-    return TypeInterval(stated, days[shortest], shortest, round(median(days.values())), len(days))
+    return TypeInterval(stated, days[shortest], shortest, median_low(days.values()), len(days))

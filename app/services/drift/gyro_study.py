@@ -39,7 +39,8 @@ def studied(payload: Mapping[str, Any], report: Report) -> dict[str, Any]:
     -------
     dict
         By method ``document`` (JSON text), ``series`` (Arrow, with the charts' columns), ``solver_version``,
-        ``findings`` (as `alarms.Finding`), ``counting`` (ids of the results that count).
+        ``findings`` (as `alarms.Finding`), ``counting`` (ids of the results that count), ``recalibrations`` (what
+        was found at the end of intervals).
     """
     made = {}
     heard = _MAIN if _MAIN in payload["series"] else next(iter(payload["series"]), None)
@@ -54,5 +55,6 @@ def studied(payload: Mapping[str, Any], report: Report) -> dict[str, Any]:
             "document": dumps(found.document), "series": series.encode(found.table),
             "solver_version": __version__, "findings": [asdict(item) for item in found.findings if method == heard],
             "counting": found.table["calibration"].tolist(),
+            "recalibrations": found.document["interval"]["findings"],
         }  # fmt: skip
     return made

@@ -77,7 +77,9 @@ def study(table: SeriesTable, known: Known) -> Studied:
         "gyro": known.gyro, "method": known.method, "sessions": len(table),
         "from": iso(table["measured_at"][0]) if len(table) else None,
         "until": None if last is None else last.isoformat(), "solver_version": __version__,
-        "parameters": entries, "interval": intervals.interval(table, known.limits, known.interval_days, entries),
+        "parameters": entries, "interval": intervals.interval(
+            table, known.limits, known.interval_days, entries, known.events
+        ),
     }  # fmt: skip
     return Studied(document, table.with_columns(columns), tuple(found))
 

@@ -56,6 +56,7 @@ def store(
             made["series"],
             made["solver_version"],
         )
+        row.recalibrations = made.get("recalibrations")
         alarms.take_in(work, row, [Finding(**item) for item in made["findings"]], made["counting"])
     work.db.flush()
     if gyro_id is not None:

@@ -139,8 +139,9 @@ class DriftStudy(Base):
     """What is known of the drift of one gyro, or of one stand, by one method: made by a job, replaced by the next.
 
     `changed` counts what came in, `studied` is its count when the study was made: it is up to date when
-    they are equal. `document` is the study as JSON text, `series` its values as columns (Arrow), `job_id`
-    the job that makes the next one.
+    they are equal. `document` is the study as JSON text, `series` its values as columns (Arrow),
+    `recalibrations` what a gyro's calibrations found at the end of intervals, by which limits, `job_id` the job
+    that makes the next one.
     """
 
     __tablename__ = "drift_study"
@@ -160,4 +161,5 @@ class DriftStudy(Base):
     solver_version: Mapped[str | None]
     document: Mapped[str | None] = mapped_column(deferred=True)
     series: Mapped[bytes | None] = mapped_column(deferred=True)
+    recalibrations: Mapped[dict[str, Any] | None] = mapped_column(deferred=True)
     job_id: Mapped[str | None]

@@ -203,6 +203,16 @@ def modelled(within: int, count: int, days: float, at_least: float, target: floa
     )
 
 
+def all_within(count: int, days: float) -> Message:
+    """Statistical: nothing was beyond a limit."""
+    return Message(
+        "findings-all-within",
+        "All of %(count)d recalibrations, after intervals of different lengths, found everything within limits: "
+        "nothing speaks against %(days)d days.",
+        {"count": count, "days": round(days)},
+    )
+
+
 def few_findings(count: int) -> Message:
     """Statistical: nothing to go by."""
     return Message(

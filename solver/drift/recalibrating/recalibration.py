@@ -14,7 +14,8 @@ In-service checking (6.5)
     is reached, checks must follow one another within the time in which the drift takes the rest of the way.
 Other statistical approaches (6.6)
     Share of findings within tolerance: `reliability`, by the reliability model where the intervals
-    were of different lengths, else by the test of the one interval.
+    were of different lengths, else by the test of the one interval; it judges the interval so far if the findings
+    count as found at its end. Findings of which none is beyond a limit never speak for a shorter one.
 
 The recommendation is the shortest that applies, down to the next step of the grid, and at most twice the interval so
 far: nothing is known of what lies further ahead.
@@ -33,10 +34,11 @@ from solver.drift.recalibrating.interval_evidence import COUNTS_FROM, Check, Evi
 from solver.drift.recalibrating.interval_reasons import Method
 from solver.drift.recalibrating.reliability import TARGET, judge_interval, reliability_model
 from solver.errors import InputError, Message
+from solver.records import Array
 
 __all__ = [
     "Check", "Evidence", "Findings", "Method", "MethodAdvice", "Outlook", "Recommendation", "Use",
-    "control_chart", "in_service", "in_use", "recommend", "staircase", "statistical",
+    "choose", "control_chart", "in_service", "in_use", "recommend", "staircase", "statistical",
 ]  # fmt: skip
 GRID: Final = (7, 14, 30, 61, 91, 122, 183, 274, 365, 548, 730, 1096, 1461, 1826)
 """Days: one and two weeks, one, two, three, four, six, nine months, one year, and so on to five."""
@@ -104,13 +106,26 @@ def recommend(evidence: Evidence) -> Recommendation:
         in_service(evidence.checks, evidence.horizon),
         statistical(evidence.days, evidence.own, evidence.of_type, evidence.target),
     )
+    return choose(evidence.days, methods)
+
+
+def choose(days: float, methods: tuple[MethodAdvice, ...]) -> Recommendation:
+    """Take the shortest interval that any method gives.
+
+    Parameters
+    ----------
+    days : float
+        Interval so far.
+    methods
+        In the order of ILAC-G24.
+    """
     given = [one for one in methods if one.days is not None and one.interval_of == "recalibration"]
     if not given:
-        return Recommendation(round(evidence.days), methods, reasons.nothing(evidence.days))
+        return Recommendation(round(days), methods, reasons.nothing(days))
     shortest = min(given, key=lambda one: one.days or 0.0)
     wanted = shortest.days or 0.0
-    days = _down(min(wanted, _LARGEST_CHANGE * evidence.days), evidence.days)
-    return Recommendation(days, methods, reasons.chosen(shortest.method, days, wanted, evidence.days))
+    taken = _down(min(wanted, _LARGEST_CHANGE * days), days)
+    return Recommendation(taken, methods, reasons.chosen(shortest.method, taken, wanted, days))
 
 
 def staircase(days: float, findings: Findings | None) -> MethodAdvice:
@@ -195,14 +210,23 @@ def statistical(
         return MethodAdvice("statistical", None, reasons.few_findings(len(times)))
     within, longest = used <= 1.0, float(times.max())
     count, good = len(times), int(within.sum())
+    length = _judged(days, times)
     if longest <= _ONE_LENGTH * float(times.min()):
-        one = judge_interval(good, count, float(np.median(times)), target)
+        one = judge_interval(good, count, length, target)
         return MethodAdvice(
             "statistical", one.days, reasons.tested(one.changed, good, count, one.days, target)
         )
     model = reliability_model(times, within, target)
     ahead = min(model.days, _LARGEST_CHANGE * longest)
+    if good == count and ahead < length:  # few findings, all of them good, are no ground for a shorter one
+        return MethodAdvice("statistical", length, reasons.all_within(count, length))
     return MethodAdvice("statistical", ahead, reasons.modelled(good, count, ahead, model.at_least, target))
+
+
+def _judged(days: float, times: Array) -> float:
+    """The interval that findings judge: the one so far, if they count as found at its end, else their middle."""
+    middle = float(np.median(times))
+    return days if COUNTS_FROM * days <= middle < days else middle
 
 
 def _step(days: float, by: int) -> float:

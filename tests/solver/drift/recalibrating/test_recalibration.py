@@ -261,3 +261,13 @@ def test_what_does_not_fit_is_refused():
         control_chart([Outlook("w0x", [0.0], [0.0, 1.0], [0.0], None, 1.0)], 100)
     with pytest.raises(InputError, match="not negative"):
         in_service([Check("w0x", -0.1, 1.0, 0.1)], 100)
+
+
+def test_findings_within_the_limits_speak_for_no_shorter_interval():
+    """Findings of 300 days count as found after a year; of different lengths, they are too few for a model."""
+    same = statistical(365, Findings([300] * 6, [0.5] * 6), None)
+    assert (same.days, same.reason.code) == (365, "findings-stand")
+    mixed = statistical(365, Findings([300, 300, 300, 600, 620, 330], [0.5] * 6), None)
+    assert (mixed.days, mixed.reason.code) == (365, "findings-all-within")
+    beyond = statistical(365, Findings([300, 300, 300, 600, 620, 330], [0.5] * 5 + [1.5]), None)
+    assert (beyond.days < 365, beyond.reason.code) == (True, "findings-model")
