@@ -15,6 +15,7 @@ from app.cli.tables import print_result
 from app.errors import AppError, Invalid, Problem, problem
 from app.exchange.certificate import read_certificate
 from app.exchange.json_values import dumps, message_json
+from app.exchange.plausible import CODE as CURRENT_UNIT
 from app.exchange.prior import read_prior
 from app.exchange.rows import CertificateRow
 from app.exchange.session_folder import SessionFiles
@@ -149,7 +150,10 @@ def _solve_one(
     except AppError as error:  # what is wrong between files has no file of its own: it is this item's
         raise type(error)(*(replace(one, file=one.file or item.name) for one in error.problems)) from error
     result: dict[str, Any] = json.loads(output["result"])
-    warnings = [*session.warnings, *_differences(session, rows, named, latitude_deg)]
+    warnings = [
+        item for item in session.warnings if item.code != CURRENT_UNIT
+    ]  # the result says it of all currents
+    warnings += _differences(session, rows, named, latitude_deg)
     incomplete = incomplete_uncertainties(means)
     warnings += [incomplete] if incomplete else []
     if warnings:

@@ -18,6 +18,8 @@ from solver.errors import Message
 from solver.units import ma_from_ampere
 
 _USUAL_SCALE: Final = 10.0  # rad/(s·A)
+CODE: Final = "current-unit"
+"""Of every word about currents in another unit."""
 USUAL_MA: Final = ma_from_ampere(EARTH_RATE / _USUAL_SCALE)
 """Current for the whole Earth rate, mA."""
 
@@ -29,16 +31,45 @@ _FEWEST: Final = 4  # rows from which "the others" can be told
 
 def current_unit(rows: Sequence[MeansRow], columns: dict[str, Column], problems: Problems) -> list[Message]:
     """Note rows that slipped by a factor of 1000; warn when the whole file looks like another unit."""
-    sizes = [max(abs(row.jx_ma), abs(row.jy_ma)) for row in rows]
-    usual = median(sizes)
-    if not usual:
-        return []
-    if len(rows) >= _FEWEST:
+    sizes = _sizes(rows)
+    if len(rows) >= _FEWEST and median(sizes):
         _check_too_large(rows, sizes, columns, problems)
         _check_too_small(rows, sizes, columns, problems)
-    if USUAL_MA / _HALF_WAY <= usual <= USUAL_MA * _HALF_WAY:
+    usual = _unusual(sizes)
+    return [] if usual is None else [_other_unit(usual, columns["jx"].name, problems.file or "")]
+
+
+def another_unit(rows: Sequence[MeansRow]) -> list[Message]:
+    """Warn when all currents of a session look like another unit, whichever way they came."""
+    usual = _unusual(_sizes(rows))
+    if usual is None:
         return []
-    return [_other_unit(usual, columns["jx"].name, problems.file or "")]
+    values = {"value": usual, "usual": USUAL_MA}
+    if usual > USUAL_MA:
+        return [
+            Message(
+                CODE, "Currents of about %(value).3g mA are large for a gyro in the Earth rate (usual are %(usual).1g "
+                "mA). If they are really in µA, bring them in again in their unit; until then nothing is expected of "
+                "the gyro by this result.", values,
+            )
+        ]  # fmt: skip
+    return [
+        Message(
+            CODE, "Currents of about %(value).3g mA are small for a gyro in the Earth rate (usual are %(usual).1g mA). "
+            "If they are really in A, bring them in again in their unit; until then nothing is expected of the gyro "
+            "by this result.", values,
+        )
+    ]  # fmt: skip
+
+
+def _sizes(rows: Sequence[MeansRow]) -> list[float]:
+    return [max(abs(row.jx_ma), abs(row.jy_ma)) for row in rows]
+
+
+def _unusual(sizes: Sequence[float]) -> float | None:
+    """The usual size of these currents, mA, when it is far from that of other gyros."""
+    usual = median(sizes)
+    return usual if usual and not USUAL_MA / _HALF_WAY <= usual <= USUAL_MA * _HALF_WAY else None
 
 
 def _check_too_large(
@@ -81,13 +112,13 @@ def _check_too_small(
 def _slipped(which: str, value: float) -> Message:
     if which == "large":
         return Message(
-            "current-unit",
+            CODE,
             "%(value)g mA is about 1000 times the other currents of this file. Write it in the unit of the "
             "column's name.",
             {"value": value},
         )
     return Message(
-        "current-unit",
+        CODE,
         "The currents of this row, at most %(value)g mA, are about 1000 times smaller than those of all "
         "other rows. Write them in the unit of the column's name.",
         {"value": value},
@@ -98,13 +129,13 @@ def _other_unit(usual: float, name: str, file: str) -> Message:
     values = {"file": file, "value": usual, "name": name, "usual": USUAL_MA}
     if usual > USUAL_MA:
         return Message(
-            "current-unit",
+            CODE,
             "%(file)s: currents of about %(value).3g mA are large for a gyro in the Earth rate (usual are "
             "%(usual).1g mA). If %(name)s is really in µA, name the columns jx_ua and jy_ua.",
             values,
         )
     return Message(
-        "current-unit",
+        CODE,
         "%(file)s: currents of about %(value).3g mA are small for a gyro in the Earth rate (usual are "
         "%(usual).1g mA). If %(name)s is really in A, name the columns jx_a and jy_a.",
         values,

@@ -10,6 +10,7 @@ from typing import Any
 
 from app.exchange.json_values import message_json
 from app.exchange.parameters import Known
+from app.exchange.plausible import CODE as CURRENT_UNIT
 from app.exchange.prior import widened
 from app.services.gyros import nominals_of
 from app.services.lab import Work
@@ -43,11 +44,15 @@ def expectation(work: Work, session: MeasuringSession) -> Prior | None:
 def _from_calibration(row: Calibration) -> Prior | None:
     """A sound result as an expectation; None when its own diagnosis found something or nothing is determined.
 
-    A gyro that was itself not the one expected is what is expected from then on.
+    A gyro that was itself not the one expected is what is expected from then on; currents that may be in another
+    unit are not.
     """
     method = main_method(row)
     stored = json.loads(row.result)
-    if any(item["code"] != "far-from-prior" for item in stored.get(method, stored).get("diagnosis") or ()):
+    answer = stored.get(method, stored)
+    if any(item["code"] != "far-from-prior" for item in answer.get("diagnosis") or ()):
+        return None
+    if any(item["code"] == CURRENT_UNIT for item in answer["warnings"]):
         return None
     known = {
         item.parameter: Known(item.value, item.standard_uncertainty)

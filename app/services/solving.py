@@ -9,8 +9,10 @@ from app.exchange.attitude import attitude_json
 from app.exchange.distributions import monte_carlo_json, no_monte_carlo_json
 from app.exchange.examination import diagnosis_json
 from app.exchange.further_terms import model_json
-from app.exchange.json_values import Json, dumps
+from app.exchange.json_values import Json, dumps, message_json
+from app.exchange.means import match
 from app.exchange.parameters import Known
+from app.exchange.plausible import another_unit
 from app.exchange.prior import prior_si
 from app.exchange.result import ResultMethod, calibration_json
 from app.exchange.rows import CertificateRow, MeansRow
@@ -51,10 +53,10 @@ class Stated:
     seed: int = 0
 
 
-TRIALS_FOR_TWO_DIGITS: Final = 1_000_000
-"""From so many draws on they judge first order to two digits of u, with fewer to one (JCGM 101, 7.2.2)."""
 FEWEST_TRIALS: Final = 10_000
 """With fewer draws the ends of a 95 % interval say nothing (JCGM 101, 7.2.2: many times 1/(1 − p))."""
+TRIALS_FOR_TWO_DIGITS: Final = 1_000_000
+"""From so many draws on they judge first order to two digits of u, with fewer to one (JCGM 101, 7.2.2)."""
 NOTHING: Final = Stated()
 
 
@@ -93,6 +95,9 @@ def solved(
     said = {"uncertainties": dict(stated.uncertainties), "prior": stated.prior}
     result = calibration_json(calibration, method, further, said)
     answers = [result[name] for name in ("least-squares", "paper")] if method == "both" else [result]
+    about_input = [message_json(item) for item in (*match(means, certificate)[1], *another_unit(means))]
+    for answer in answers:
+        answer["warnings"] = about_input + answer.get("warnings", [])
     return {
         "result": dumps(result),
         "input_hash": calibration.input_hash,

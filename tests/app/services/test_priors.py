@@ -20,8 +20,8 @@ NOMINALS = {"kx": Nominal(2060.0, 100.0), "wg": Nominal(0.0, 5.0)}
 BEGUN = datetime(2026, 3, 1, 9, tzinfo=UTC)
 
 
-def measure(work, bench, begun, *, exchanged=False):
-    """A solved session; with `exchanged`, its channels were."""
+def measure(work, bench, begun, *, exchanged=False, scale=1.0):
+    """A solved session; with `exchanged`, its channels were; with a `scale`, the currents are in another unit."""
     session = open_session(work, NewSession("0417", "S1", started_at=begun))
     means = mean_currents(bench, sixteen_positions())
     columns = (
@@ -31,7 +31,7 @@ def measure(work, bench, begun, *, exchanged=False):
     )
     rows = [
         MeansRow(degrees(means.theta[n]), degrees(means.psi[n]),
-                 *(float(ma_from_ampere(column[n])) for column in columns), 60.0, 200.0)
+                 *(scale * float(ma_from_ampere(column[n])) for column in columns), 60.0, 200.0)
         for n in range(16)
     ]  # fmt: skip
     ingest.save(work, session.id, [ingest.Measured(row, ingest.Source("typed")) for row in rows])
@@ -103,3 +103,12 @@ def test_a_blundered_calibration_is_no_expectation(typed, bench):
         told = calibrations.calibration(work, results[blundered].id).result["diagnosis"]
     assert told[0]["code"] == "channels-swapped"
     assert found["source"]["values"]["session"] == sound
+
+
+def test_currents_that_may_be_in_another_unit_are_no_expectation(typed, bench):
+    with typed.write(SYSTEM) as work:
+        measure(work, bench, BEGUN, scale=1000.0)
+        second = measure(work, bench, BEGUN + timedelta(days=30))
+        assert expected(work, second)["source"]["code"] == "prior-type"
+        third = measure(work, bench, BEGUN + timedelta(days=60))
+        assert expected(work, third)["source"]["code"] == "prior-calibration"
