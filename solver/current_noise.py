@@ -9,7 +9,7 @@ the σ of a channel are nearly equal, and each position tells something of the o
     e_i = ln u_i² − ψ(ν_i/2) + ln(ν_i/2)    has the expectation ln s₀² − ψ(d₀/2) + ln(d₀/2)
     ψ'(d₀/2) = var(e) − mean ψ'(ν_i/2)      d₀ and s₀² by moments of e; d₀ = ∞ where this is not positive
 
-the posterior of σ_i² has (G. K. Smyth, Stat. Appl. Genet. Mol. Biol. 3, 2004, 3, sections 4 and 6.2)
+the posterior of σ_i² has (G. K. Smyth, Stat. Appl. Genet. Mol. Biol. 3, 2004, 3, sections 3 and 6.2)
 
     ũ_i² = (d₀·s₀² + ν_i·u_i²)/(d₀ + ν_i),   ν̃_i = d₀ + ν_i
 

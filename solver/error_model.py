@@ -35,11 +35,14 @@ class Equations:
         Earth rate along the case axes, rad/s.
     u_currents : (n, 2) array or None
         Standard uncertainties of Jx and Jy to weigh by, A (`solver.current_noise`).
+    dof_currents : (n, 2) array or None
+        Their degrees of freedom; None: they are known.
     """
 
     design: Array
     right_side: Array
     u_currents: Array | None
+    dof_currents: Array | None = None
 
     def residuals(self, parameters: Array) -> Array:
         """Right side minus left side, (2n,), rad/s."""
@@ -54,6 +57,7 @@ def observation_equations(observations: Observations) -> Equations:
         design=design_matrix(at, observations.jx, observations.jy),
         right_side=right_side(at, *earth_rate(observations.latitude)),
         u_currents=None if noise is None else noise.u,
+        dof_currents=None if noise is None else noise.dof,
     )
 
 

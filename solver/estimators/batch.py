@@ -14,6 +14,7 @@ import numpy as np
 from solver.current_noise import moderated
 from solver.error_model import Equations, design_matrix, earth_rate
 from solver.estimators.block import BLOCK, JX, JY, ONE, RX, RY, C, D, Sound, solve_block
+from solver.estimators.estimated_weights import widened_block
 from solver.estimators.estimation import least_squares
 from solver.geometry import Elements, commanded
 from solver.records import Array
@@ -125,20 +126,26 @@ def solve_sessions(
     """
     count = len(jx)
     if u_jx is not None and u_jy is not None:
-        u_jx, u_jy = moderated(u_jx, np.asarray(dof_jx))[0], moderated(u_jy, np.asarray(dof_jy))[0]
+        u_jx, dof_jx = moderated(u_jx, np.asarray(dof_jx))
+        u_jy, dof_jy = moderated(u_jy, np.asarray(dof_jy))
     values, chi2 = np.empty((count, 8)), np.empty(count)
     covariance, alone = np.empty((count, 8, 8)), np.empty(count, dtype=np.bool_)
     for part in _blocks(count):
         z = stand.block(angles[part] if angles.ndim == 3 else angles, jx[part], jy[part])
-        u = None
+        u = dof = None
         if u_jx is not None and u_jy is not None:
             u = (_of_block(u_jx, part, jx), _of_block(u_jy, part, jx))
+            dof = (_of_block(np.asarray(dof_jx), part, jx), _of_block(np.asarray(dof_jy), part, jx))
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # such sessions go alone
             solved = solve_block(z, u)
+            if u is not None and dof is not None and (np.isfinite(dof[0]).any() or np.isfinite(dof[1]).any()):
+                solved.covariance[:] = widened_block(
+                    design_matrix(_elements(z), z[JX].T, z[JY].T), u, dof, solved.values, solved.covariance
+                )
         values[part], chi2[part], alone[part] = solved.values.T, solved.square, ~solved.sound
         covariance[part] = solved.covariance.transpose(2, 0, 1)
         for row in np.flatnonzero(~solved.sound):
-            estimate = least_squares(_equations(z, u, int(row)), None).estimate
+            estimate = least_squares(_equations(z, u, dof, int(row)), None).estimate
             index = part.start + int(row)
             values[index], covariance[index] = estimate.values, estimate.covariance
             chi2[index] = np.sum(estimate.residuals**2) if u is None else (estimate.fit.chi2 or np.nan)
@@ -156,11 +163,24 @@ def _of_block(u: Array, part: slice, like: Array) -> Array:
     return np.ascontiguousarray(u[part].T)
 
 
-def _equations(z: Array, u: tuple[Array, Array] | None, column: int) -> Equations:
+def _equations(
+    z: Array, u: tuple[Array, Array] | None, dof: tuple[Array, Array] | None, column: int
+) -> Equations:
     """The observation equations of one session of a block."""
-    jx, jy, _, c, d, rx, ry = z[:, :, column]
-    u_currents = None
-    if u is not None:
-        u_currents = np.stack([one[:, column if one.shape[1] > 1 else 0] for one in u], axis=-1)
-    design = design_matrix(Elements(c, c, c, d, d), jx, jy)  # of the elements it takes c and d alone
-    return Equations(design, np.stack((rx, ry), axis=-1).ravel(), u_currents)
+    one = z[:, :, column, None]
+    design = design_matrix(_elements(one), one[JX].T, one[JY].T)[0]
+    right_side = np.stack((one[RX], one[RY]), axis=1).ravel()
+    return Equations(design, right_side, _of_session(u, column), _of_session(dof, column))
+
+
+def _of_session(pair: tuple[Array, Array] | None, column: int) -> Array | None:
+    """What belongs to the currents of one session of a block, (n, 2)."""
+    if pair is None:
+        return None
+    return np.stack([one[:, column if one.shape[1] > 1 else 0] for one in pair], axis=-1)
+
+
+def _elements(z: Array) -> Elements:
+    """Elements of a block for the design, which takes c and d alone; (B, n) each."""
+    c, d = z[C].T, z[D].T
+    return Elements(c, c, c, d, d)

@@ -13,6 +13,7 @@ from scipy import special
 
 from solver.constants import EARTH_RATE
 from solver.errors import Message
+from solver.estimators.estimated_weights import widened
 from solver.estimators.fit_quality import Scatter, judge
 from solver.estimators.observability import Invisible, names, unobservable
 from solver.estimators.rate_noise import INDEPENDENT, Noise, Problem, blocks_of, noise_of
@@ -33,8 +34,8 @@ class Linearised:
     gain : (8, 2n) array
         H: δq = H·δ(residuals); NaN in the rows of parameters that the data do not determine.
     inputs
-        The uncertain inputs around `values`. For the robust method the covariance of what differs
-        from position to position is multiplied by the square of `inflation`.
+        The uncertain inputs around `values`, u(J) times `Solved.widening`. For the robust method the covariance
+        of what differs from position to position is multiplied by the square of `inflation`.
     values : (8,) array
         Parameters around which all is linearised; finite also where the estimate is blank.
     basis
@@ -76,6 +77,8 @@ class Solved:
         See `Linearised`.
     weights : (n, 2) array or None
         Weight of each whitened equation in the robust method, 0 to 1.
+    widening : (n, 2) array or None
+        Factors on u(J) that allow for weights by estimates of it (`solver.estimators.estimated_weights`).
     """
 
     estimate: Estimate
@@ -85,12 +88,17 @@ class Solved:
     scatter: float
     inflation: float = 1.0
     weights: Array | None = None
+    widening: Array | None = None
 
     def linearise(self) -> Linearised:
         """Gather the estimator's gain and inputs."""
         estimate, inputs = self.estimate, self.problem.inputs(self.values)
         if self.inflation != 1.0:
             factor = np.where(np.isin(inputs.source, INDEPENDENT), self.inflation, 1.0)
+            inputs = replace(inputs, covariance=inputs.covariance * np.outer(factor, factor))
+        if self.widening is not None:
+            factor = np.ones(len(inputs.source))
+            factor[inputs.source == "currents"] = self.widening.ravel()
             inputs = replace(inputs, covariance=inputs.covariance * np.outer(factor, factor))
         by_scatter = estimate.uncertainty_basis == "scatter"
         variance = self.inflation**2 * self.scatter
@@ -114,6 +122,7 @@ def conclude(
     invisible: Invisible,
     *,
     history: Array | None = None,
+    widening: Array | None = None,
 ) -> Solved:
     """Report an estimator's answer.
 
@@ -129,13 +138,18 @@ def conclude(
         What the data do not determine.
     history : (rounds, 8) array, optional
         Its approximations.
+    widening : (n, 2) array, optional
+        See `Solved`.
     """
     dof = gain.shape[1] - 8 + len(invisible.directions)
     noise = noise_of(problem, values, dof, invisible)
     judged = judge_residuals(problem, values, gain, noise, dof)
     fit = fit_of(noise, dof, solution, with_spectrum=method != "paper")
-    estimate = report(method, problem, values, gain, noise, judged, fit, invisible)
-    return Solved(replace(estimate, iterations=history), problem, gain, values, noise.scatter)
+    wide = widened(noise, problem.equations, values, widening)
+    estimate = report(method, problem, values, gain, wide, judged, fit, invisible)
+    return Solved(
+        replace(estimate, iterations=history), problem, gain, values, noise.scatter, widening=widening
+    )
 
 
 def judge_residuals(

@@ -11,6 +11,7 @@ from solver import successive
 from solver.error_model import Equations
 from solver.errors import NotConverged, SolverError
 from solver.estimators.conclusion import Linearised, Solved, conclude
+from solver.estimators.estimated_weights import widening_of
 from solver.estimators.observability import natural_scale, unobservable
 from solver.estimators.rate_noise import Problem, invisible_in, rough, whiten, whitening_of
 from solver.inputs import CommonUncertainty
@@ -43,7 +44,8 @@ def least_squares(
             right_side = whiten(whitening, equations.right_side)
     solution = solve(design, right_side, scale=natural_scale(design), invisible=invisible.directions)
     gain = solution.gain if whitening is None else whiten(whitening, solution.gain.T, transpose=True).T
-    return conclude("least-squares", problem, solution.values, gain, solution, invisible)
+    widening = widening_of(equations, solution.values, gain, whitening)
+    return conclude("least-squares", problem, solution.values, gain, solution, invisible, widening=widening)
 
 
 def paper(

@@ -10,6 +10,7 @@ weights of least squares are.
 from solver.error_model import Equations
 from solver.errors import InputError, Message
 from solver.estimators.conclusion import Solved, conclude
+from solver.estimators.estimated_weights import widening_of
 from solver.estimators.estimation import REWEIGHTING_ROUNDS
 from solver.estimators.observability import natural_scale
 from solver.estimators.rate_noise import Problem, inverse_scale, invisible_in, root_inverse, rough
@@ -47,4 +48,5 @@ def generalised(
         design, right_side = whitening @ equations.design, whitening @ equations.right_side
     solution = solve(design, right_side, scale=natural_scale(design), invisible=invisible.directions)
     gain = solution.gain if whitening is None else solution.gain @ whitening
-    return conclude("generalised", problem, solution.values, gain, solution, invisible)
+    widening = widening_of(equations, solution.values, gain, whitening)
+    return conclude("generalised", problem, solution.values, gain, solution, invisible, widening=widening)

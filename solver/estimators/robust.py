@@ -20,6 +20,7 @@ import numpy as np
 
 from solver.error_model import Equations
 from solver.estimators.conclusion import Solved, fit_of, judge_residuals, report
+from solver.estimators.estimated_weights import widened, widening_of
 from solver.estimators.huber import HuberFit, huber, normal_factor
 from solver.estimators.observability import Invisible, natural_scale
 from solver.estimators.rate_noise import (
@@ -76,12 +77,14 @@ def robust(
     gain = gain if whitening is None else whiten(whitening, gain.T, transpose=True).T
     dof = gain.shape[1] - 8 + len(invisible.directions)
     noise, factor = _noise(problem, fit, dof, invisible)
-    inflated = replace(noise, covariance=noise.covariance + (factor - 1.0) * noise.independent)
+    widening = widening_of(equations, values, gain, whitening)
+    wide = widened(noise, equations, values, widening)
+    inflated = replace(wide, covariance=wide.covariance + (factor - 1.0) * wide.independent)
     judged = judge_residuals(problem, values, gain, noise, dof, apart=True)
     quality = fit_of(noise, dof, solution, with_spectrum=True)
     estimate = report("robust", problem, values, gain, inflated, judged, quality, invisible)
     weights = fit.weights.reshape(-1, 2)
-    return Solved(estimate, problem, gain, values, noise.scatter, factor**0.5, weights)
+    return Solved(estimate, problem, gain, values, noise.scatter, factor**0.5, weights, widening)
 
 
 def position_whitening(problem: Problem, values: Array) -> Array | None:

@@ -104,6 +104,7 @@ def model_of(solved: Solved) -> SessionModel:
         common=problem.common,
         scatter=scatter,
         inflation=solved.inflation,
+        widening=solved.widening,
         whitening=whitening,
         rows=rows,
     )

@@ -85,6 +85,7 @@ def session_model(
     u_currents: Array | None = None,
     scatter: tuple[float, float] | None = None,
     inflation: float = 1.0,
+    widening: Array | None = None,
     whitening: Array | None = None,
     rows: Array | None = None,
 ) -> SessionModel:
@@ -95,7 +96,7 @@ def session_model(
     observations
     values : (8,) array
         The estimate.
-    common, u_currents, scatter, inflation
+    common, u_currents, scatter, inflation, widening
         The uncertain inputs: see `solver.propagation.input_draws.input_draws`.
     whitening : (n, 2, 2) or (2n, 2n) array, optional
         W of least squares, by position or whole: rows that W multiplies have unit variance. Without
@@ -121,7 +122,7 @@ def session_model(
         if rows is not None
         else _by_weights(_whole(whitening, design), whitening, design)
     )
-    inputs = input_draws(observations, values, common, u_currents, scatter, inflation)
+    inputs = input_draws(observations, values, common, u_currents, scatter, inflation, widening)
     coefficients = (common or CommonUncertainty()).temperature_coefficients
     return SessionModel(inputs, np.array(values, np.float64), coefficients, solve)
 

@@ -175,6 +175,7 @@ def input_draws(
     u_currents: Array | None = None,
     scatter: tuple[float, float] | None = None,
     inflation: float = 1.0,
+    widening: Array | None = None,
 ) -> InputDraws:
     """Prepare the draws of a session's inputs.
 
@@ -193,12 +194,16 @@ def input_draws(
         angles are (as in `solver.propagation.budget`).
     inflation : float
         Factor on u(J) and the random errors of the angles, the robust method's.
+    widening : (n, 2) array, optional
+        Factors on u(J) alone (`solver.estimators.estimated_weights`).
     """
     at = observations
     common = common or CommonUncertainty()
     dof_currents, noise = np.stack((at.dof_jx, at.dof_jy)), current_noise(at)
     if u_currents is None and noise is not None:
         u_currents, dof_currents = noise.u, np.ascontiguousarray(noise.dof.T)
+    if u_currents is not None and widening is not None:
+        u_currents = u_currents * widening
     _, first, place = np.unique(
         np.stack((at.theta, at.psi), axis=1), axis=0, return_index=True, return_inverse=True
     )

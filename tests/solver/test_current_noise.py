@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from solver.calibrate import calibrate
 from solver.current_noise import current_noise, moderated
+from solver.error_model import Equations
 from solver.estimators.batch import Stand, solve_sessions
+from solver.estimators.estimated_weights import widening_of
+from solver.propagation.distributions import propagate_distributions
 from tests.solver.sessions import Setup
 
 POSITIONS = 16
@@ -98,21 +102,66 @@ def test_channels_are_moderated_apart(rng):
     assert current_noise(replace(session, u_jx=None)) is None
 
 
-@pytest.mark.parametrize("dof", [6.0, 10.0, 20.0])
-def test_parameters_are_as_uncertain_as_stated(dof, rng):
-    """2,000 sessions whose u were estimated with ν: intervals ±1.96·u hold the truth in 93 to 96.5 %.
+SPREADS = {
+    "equal": np.ones((2, POSITIONS)),
+    "one ten times": np.where(np.arange(2 * POSITIONS).reshape(2, -1) == 5, 10.0, 1.0),
+    "half three times": np.where(np.arange(2 * POSITIONS).reshape(2, -1) % 2, 3.0, 1.0),
+}
 
-    By weights and u as they are stated it is 87, 91 and 93 %. The share of 16,000 correlated trials has a
-    standard deviation of 0.3 %, which the range allows beside the 1 % that may be missing at ν = 6.
+
+@pytest.mark.parametrize("spread", SPREADS)
+@pytest.mark.parametrize("dof", [6.0, 10.0, 20.0])
+def test_parameters_are_as_uncertain_as_stated(dof, spread, rng):
+    """4,000 sessions whose u were estimated with ν: intervals ±1.96·u hold the truth in 94 to 96 %.
+
+    With u and weights as stated it is 87, 91 and 93 %. Each share has a standard deviation of 0.34 %, the mean
+    over the eight less. What is left where σ differ at ν = 6 (93.9 %) is k, which a budget takes from ν_eff ≈ 75.
     """
-    count = 2000
-    setup = Setup(noise=0.005, u_given=True, misalignment=0.0)
+    count, setup = 4000, Setup(noise=0.005, u_given=True, misalignment=0.0)
     one = setup.observe(rng)
     exact = setup.currents(np.zeros((POSITIONS, 3)))
     order = np.lexsort((setup.positions[:, 1], setup.positions[:, 0]))
-    jx, jy = exact[order].T[:, None] + setup.u_current * rng.standard_normal((2, count, POSITIONS))
-    u = setup.u_current * estimated(rng, dof, shape=(2, count, POSITIONS))
+    sigma = setup.u_current * SPREADS[spread][:, None]
+    jx, jy = exact[order].T[:, None] + sigma * rng.standard_normal((2, count, POSITIONS))
+    u = sigma * estimated(rng, dof, shape=(2, count, POSITIONS))
     stand = Stand(one.theta, one.psi, one.latitude)
     found = solve_sessions(stand, np.zeros((POSITIONS, 3)), jx, jy, *u, dof, dof)
     held = np.abs(found.values - setup.parameters) <= stats.norm.ppf(0.975) * found.standard_uncertainties
-    assert 0.93 <= held.mean() <= 0.965
+    assert 0.935 <= held.mean() <= 0.96, held.mean(axis=0)
+
+
+def test_the_budget_and_its_monte_carlo_are_those_of_the_estimate(rng):
+    """Every method: one covariance, wherever it is told; u of 20,000 draws has a standard deviation of 0.5 %."""
+    at = Setup(noise=0.005, u_given=True).observe(rng)
+    dof = rng.uniform(8.0, 12.0, POSITIONS)
+    u = at.u_jx * estimated(rng, dof, shape=(2, POSITIONS)) * np.where(np.arange(POSITIONS) < 8, 3.0, 1.0)
+    observations = replace(at, u_jx=u[0], u_jy=u[1], dof_jx=dof, dof_jy=dof)
+    for method in ("least-squares", "generalised", "robust", "paper"):
+        found = calibrate(observations, method)
+        estimate, budget = found.answers[method], found.budget(method)
+        np.testing.assert_allclose(budget.covariance, estimate.covariance, rtol=1e-9, atol=0)
+        drawn = propagate_distributions(found.solved[method], trials=20_000)
+        inputs = found.solved[method].linearise().inputs
+        # draws are t distributed, with variance ν/(ν − 2) times u²
+        gain = found.solved[method].gain @ inputs.sensitivity
+        expected = np.sqrt(
+            (gain**2 * np.diagonal(inputs.covariance) * inputs.dof / (inputs.dof - 2)).sum(axis=1)
+        )
+        np.testing.assert_allclose(np.sqrt(np.diagonal(drawn.covariance)), expected, rtol=0.03)
+
+
+def test_the_correction_is_meiers_for_a_weighted_mean():
+    """P. Meier, Biometrics 9 (1953) 59: V = 1/W·(1 + 4·Σ(1/ν)·(w/W)·(1 − w/W))."""
+    u, dof = np.array([[1.0], [2.0], [4.0]]), np.array([[5.0], [8.0], [11.0]])
+    weights = (1 / u**2 / np.sum(1 / u**2)).ravel()
+    expected = (1 + 4 * np.sum(weights * (1 - weights) / dof.ravel())) / np.sum(1 / u**2)
+    design = np.zeros((6, 8))
+    design[::2, 4] = design[1::2, 5] = 1.0  # the mean of each channel, K = 1
+    gain = np.zeros((8, 6))
+    gain[4, ::2] = gain[5, 1::2] = weights
+    both, freedom = np.repeat(u, 2, axis=1), np.repeat(dof, 2, axis=1)
+    equations = Equations(design, np.zeros(6), both, freedom)
+    values = np.array([1.0, 1.0, 0, 0, 0, 0, 0, 0])
+    widening = widening_of(equations, values, gain, np.eye(2) / both[:, :, None])
+    found = np.sum(gain[4, ::2] ** 2 * (widening * both)[:, 0] ** 2)
+    assert found == pytest.approx(expected, rel=1e-12)
