@@ -15,6 +15,7 @@ from solver.blunders.current_model import CurrentModel, Solutions, regressors
 from solver.blunders.hypotheses import Hypothesis
 from solver.blunders.hypothesis_fit import UNTOLD, Data, Fitted, fit, other_inputs, rough
 from solver.blunders.prior import Prior
+from solver.current_noise import current_noise
 from solver.error_model import observation_equations
 from solver.estimators.estimation import least_squares
 from solver.inputs import CommonUncertainty
@@ -123,12 +124,13 @@ class Session:
     ) -> "Session":
         """Fit the data as given."""
         at = observations
-        told = at.u_jx is not None and at.u_jy is not None
+        noise = current_noise(at)
+        told = noise is not None
         x = regressors(at)
         currents = np.stack((at.jx, at.jy), axis=1)
-        if at.u_jx is not None and at.u_jy is not None:
+        if noise is not None:
             least = np.finfo(float).eps * float(np.abs(currents).max()) or 1.0
-            u = np.maximum(np.stack((at.u_jx, at.u_jy), axis=1), least)  # less than rounding means nothing
+            u = np.maximum(noise.u, least)  # less than rounding means nothing
         else:  # each channel in units of its size
             square = np.sqrt(np.mean(currents**2, axis=0))
             u = np.tile(np.where(square > 0, square, 1.0), (len(at), 1))
