@@ -61,8 +61,9 @@ class StandDrift(Outgoing):
     `document` holds what was found: `findings`, each with its `verdict` (stand, certificate, gyro, unclear, none), its
     `direction` (azimuth, level-north, level-east, certificate, own), the days between which it happened, its size
     in arcsec and its probability; and `detectable`, the smallest turns that these sessions reveal. Null before the
-    first study. `affected` are the sessions since the last change of the stand that no event explains, the newest
-    first.
+    first study. With `reduced` the points are the newest 200 of the period only: a coarser `by` or a shorter period
+    shows the others, and CSV and Parquet hold every session. `affected` are the sessions since the last change of the
+    stand that no event explains, the newest first.
     """
 
     stand: str
@@ -72,6 +73,7 @@ class StandDrift(Outgoing):
     sessions: int
     document: dict[str, Any] | None
     by: By
+    reduced: bool
     points: list[StandPoint]
     events: list[Event]
     alarms: list[Alarm]

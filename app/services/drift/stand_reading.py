@@ -70,6 +70,8 @@ class StandDrift:
         Of the study; None before the first one.
     by
         What a point stands for, as it was asked for or as it had to be for at most `MOST_POINTS` points.
+    reduced
+        Whether `points` are the newest `MOST_POINTS` of the period only.
     together
         The same sessions by the month at least: what gyros have in common shows in means of several.
     affected_since, affected
@@ -84,6 +86,7 @@ class StandDrift:
     sessions: int
     document: dict[str, Any] | None
     by: str
+    reduced: bool
     points: tuple[StandPoint, ...]
     together: tuple[StandPoint, ...]
     events: tuple[EventView, ...]
@@ -124,7 +127,8 @@ def stand_drift(
         stand=stand.name, method=following.STAND_METHOD, up_to_date=row is None or row.studied >= row.changed,
         studied_at=row.studied_at if row else None, job=job_view(job) if job else None,
         sessions=0 if table is None else len(table), document=document, by=grouping,
-        points=() if shown is None else tuple(_point(shown, members) for members in groups),
+        reduced=len(groups) > MOST_POINTS,
+        points=() if shown is None else tuple(_point(shown, members) for members in groups[-MOST_POINTS:]),
         together=() if shown is None else tuple(_point(shown, members) for members in _together(shown, grouping)),
         events=events.of_stand(work, name), alarms=alarms.alarms(work, stand=name), affected_since=since_change,
         affected=() if table is None or since_change is None else tuple(_since(table, since_change)),
@@ -154,11 +158,11 @@ def _grouped(table: SeriesTable, by: str | None) -> tuple[str, list[NDArray[np.i
         if by is not None or len(first) <= MOST_POINTS or name == GROUPS[-1]:
             break
     cuts = np.flatnonzero(keys[1:] != keys[:-1]) + 1
-    return name, np.split(np.arange(len(table)), cuts)[-MOST_POINTS:] if len(table) else []
+    return name, np.split(np.arange(len(table)), cuts) if len(table) else []
 
 
 def _together(table: SeriesTable, by: str) -> list[NDArray[np.int64]]:
-    return _grouped(table, "year" if by == "year" else "month")[1]
+    return _grouped(table, "year" if by == "year" else "month")[1][-MOST_POINTS:]
 
 
 def _point(table: SeriesTable, members: NDArray[np.int64]) -> StandPoint:

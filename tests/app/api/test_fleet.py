@@ -4,14 +4,16 @@ import io
 from datetime import UTC, datetime
 
 import httpx
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from serving import Service
 from stand_tables import sessions, stored, turned
 
 from app.services import access
-from app.services.drift import studying
+from app.services.drift import series, studying
 from app.services.lab import Lab
+from app.store import drift
 
 PARQUET = {"accept": "application/vnd.apache.parquet"}
 CSV = {"accept": "text/csv"}
@@ -42,11 +44,11 @@ def test_all_of_it_in_every_form(client: httpx.Client, lab: Lab) -> None:
     assert client.get("/types/GVK-6/fleet", headers=CSV).text.startswith("gyro,type,check")
     assert client.get("/types/none/fleet").status_code == 404
 
-    drift = client.get("/stands/S1/drift").json()
-    assert [item["direction"] for item in drift["document"]["findings"]] == ["azimuth"]
-    assert (len(drift["points"]), drift["by"], drift["up_to_date"]) == (24, "session", True)
-    assert drift["alarms"][0]["kind"] == "stand-azimuth"
-    assert 8 <= len(drift["affected"]) <= 16  # twelve sessions came after the turn
+    turns = client.get("/stands/S1/drift").json()
+    assert [item["direction"] for item in turns["document"]["findings"]] == ["azimuth"]
+    assert (len(turns["points"]), turns["by"], turns["up_to_date"]) == (24, "session", True)
+    assert turns["alarms"][0]["kind"] == "stand-azimuth"
+    assert 8 <= len(turns["affected"]) <= 16  # twelve sessions came after the turn
     assert len(client.get("/stands/S1/drift?by=month").json()["points"]) == 6
     assert client.get("/stands/S1/drift?by=moon").status_code == 422
     assert client.get("/stands/S9/drift").status_code == 404
@@ -61,6 +63,25 @@ def test_all_of_it_in_every_form(client: httpx.Client, lab: Lab) -> None:
     assert client.get("/compare?a=session:1&b=session:1").status_code == 422
     assert client.get("/compare?a=session:1").status_code == 422
     assert client.get("/compare?a=session:1&b=session:999").status_code == 404
+
+
+def test_points_that_are_left_out_are_told(client: httpx.Client, lab: Lab) -> None:
+    """250 sessions of a stand, a day apart: more than are given at once."""
+    with lab.write(access.SYSTEM) as work:
+        (row,) = drift.studies(work.db, None, 1, whole=True)
+        table = series.decode(row.series or b"")
+        last, numbers = table["measured_at"][-1], np.arange(250)
+        made = {name: np.repeat(column[-1:], 250) for name, column in table.columns.items()}
+        made |= {"session": numbers + 1, "measured_at": last - (249 - numbers) * np.timedelta64(1, "D")}
+        row.series = series.encode(series.SeriesTable(made))
+    for by in ("session", "day"):
+        found = client.get("/stands/S1/drift", params={"by": by}).json()
+        assert (found["sessions"], found["reduced"]) == (250, True)
+        assert [point["session"] for point in found["points"]] == list(range(51, 251))
+    whole = client.get("/stands/S1/drift").json()
+    assert (whole["by"], whole["reduced"]) == ("week", False)
+    assert sum(point["sessions"] for point in whole["points"]) == 250
+    assert len(client.get("/stands/S1/drift?by=day", headers=CSV).text.splitlines()) == 251
 
 
 def test_differences_are_in_units_of_their_uncertainty(client: httpx.Client, lab: Lab) -> None:
