@@ -65,7 +65,8 @@ class Cycle:
         except StopAsked:
             self._halt("stopped")
             raise
-        except BaseException:
+        except BaseException as error:
+            self._tell(error)
             self._halt("failed")
             raise
 
@@ -183,9 +184,9 @@ class Cycle:
         attempt = at.history.open_attempt
         if attempt is not None and attempt.acquiring is not None:
             at.spool.add(Abandoned(attempt.number, Said.of(message)))
-        at.spool.note("error", message)
         if not self.attended:
             raise NotFinished(*pressed.problems) from pressed
+        at.spool.note("error", message)
         at.live.turn_to("paused")
         at.live.show(paused=True)
         while at.live.now.paused:
@@ -203,11 +204,15 @@ class Cycle:
             self._find_again(lost)
 
     def _halt(self, phase: Phase) -> None:
-        """Leave nothing moving; an instrument that cannot be told is not moved by us either."""
+        """Leave nothing moving; a stand that cannot be told is not moved by us either."""
         self.at.live.turn_to(phase)
         try:
-            if self.at.stand.status().moving:
-                self.at.stand.stop()
+            self.at.halt()
         except AppError as error:
-            with suppress(SpoolFailed):  # that is why the cycle ends
-                self.at.spool.note("error", error.problems[0].message)
+            self._tell(error)
+
+    def _tell(self, error: BaseException) -> None:
+        """Let the log name what ended the cycle."""
+        with suppress(SpoolFailed):  # that is why the cycle ends
+            for item in error.problems if isinstance(error, AppError) else ():
+                self.at.spool.note("error", item.message)

@@ -265,9 +265,10 @@ def _judge(at: Workplace, attempt: Attempt, blocks: BlockFile, overload: bool) -
 
 
 def _fail(at: Workplace, attempt: Attempt, failed: AppError) -> None:
-    """Keep a take that came to no record as refused, for its reason."""
+    """Keep a take that came to no record as refused, for its reason; nothing moves on."""
     message = failed.problems[0].message
     at.spool.add(Judged(attempt.number, "refused", (Finding(Said.of(message)),)))
+    at.halt()
 
 
 def _give_up(at: Workplace, attempt: Attempt, why: Message) -> NoReturn:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final, Literal, Protocol
 
-from app.errors import problem
+from app.errors import AppError, problem
 from app.exchange.positions import same_angle
 from app.station.clock import Clock
 from app.station.contracts import Ammeter, EmergencyStop, Place, Stand, StandStatus
@@ -109,6 +109,15 @@ class Workplace:
             return self.look()
         self.heed()
         return self._looked[1]
+
+    def halt(self) -> None:
+        """Leave nothing moving: a stand that does not say that it stands is stopped. Raises as its `stop`."""
+        try:
+            moving = self.stand.status().moving
+        except AppError:  # whatever it says, it may move
+            moving = True
+        if moving:
+            self.stand.stop()
 
     def wait(self) -> None:
         """Let a little time pass until the instruments are asked again."""

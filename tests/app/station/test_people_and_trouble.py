@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from unreal import PLACES, Room, true_record
 
-from app.errors import problem
+from app.errors import Invalid, problem
 from app.station import cycle, finishing
 from app.station.contracts import EmergencyStop, InstrumentFault, InstrumentLost, Place
 from app.station.controls import Command, Controls, StopAsked
@@ -173,6 +173,53 @@ def test_a_moving_stand_is_stopped_when_the_cycle_ends(room, monkeypatch):
     with pytest.raises(StopAsked):
         room.run()
     assert room.stand.stops == 1
+
+
+def test_a_moving_stand_whose_answers_nobody_understands_is_stopped_before_anything_else(room, monkeypatch):
+    told, unclear = type(room.stand).status, []
+
+    def muddled(self):
+        if unclear and not self.stops:
+            raise InstrumentFault(problem("instrument-unclear", "Answered by ?"))
+        return told(self)
+
+    monkeypatch.setattr(type(room.stand), "status", muddled)
+    at_move(room, 2, lambda: unclear.append(True))
+    history = room.run()
+    assert room.stand.stops == 1
+    assert [item.verdict for item in history.takes(Target(*PLACES[1]))] == ["refused", "accepted"]
+    assert history.result is not None
+
+
+def test_a_stand_that_cannot_be_understood_is_stopped_when_the_cycle_ends(room, monkeypatch):
+    told, ended = type(room.stand).status, []
+
+    def muddled(self):
+        if ended:
+            raise InstrumentFault(problem("instrument-unclear", "Answered by ?"))
+        return told(self)
+
+    monkeypatch.setattr(type(room.stand), "status", muddled)
+
+    def end() -> None:
+        ended.append(True)
+        room.controls.stopped_by = "SIGTERM"
+
+    at_move(room, 2, end)
+    with pytest.raises(StopAsked):
+        room.run()
+    assert room.stand.stops == 1
+
+
+def test_why_a_cycle_ended_is_in_its_log(room):
+    def beyond(place: Place) -> None:
+        raise Invalid(problem("beyond-travel", "The stand cannot go there."))
+
+    room.stand.before_move = beyond
+    with pytest.raises(Invalid):
+        room.run()
+    told = [(event.level, event.said.code) for event in history_in(room.folder).events]
+    assert told == [("error", "beyond-travel")]
 
 
 # Emergency stop
