@@ -35,6 +35,13 @@ class Place(NamedTuple):
     psi_deg: float
 
 
+class Certified(NamedTuple):
+    """A position of the stand's certificate, and the largest rotation √(α² + β² + γ²) that it certifies there."""
+
+    place: Place
+    turned_arcsec: float
+
+
 @dataclass(frozen=True, slots=True)
 class StandStatus:
     """How the stand stands: referenced to its zero, moving, stopped for safety, and where its encoders are."""

@@ -9,7 +9,8 @@ import numpy as np
 from app.exchange.rows import CurrentRecord
 from app.station.contracts import Currents, Place
 from app.station.judgement import checks, partners
-from app.station.judgement.checks import Expectations, Take, Thresholds
+from app.station.judgement.checks import Take
+from app.station.judgement.expectations import Expectations, Thresholds
 from app.station.judgement.settling import RestRule, RestWatch
 from app.station.keeping.entries import Finding, Said, Target, Verdict
 from app.station.keeping.history import History
@@ -103,9 +104,18 @@ class Rules:
         self, means: Mapping[Place, Currents], history: History
     ) -> Iterable[tuple[Message, tuple[Place, ...]]]:
         """Pairs of partners whose sum is not that of the others."""
-        expected = self._expected(history)
-        for pair in partners.odd_pairs(means, expected.partner_na or self.thresholds.partner_na):
+        for pair in partners.odd_pairs(means, self._partners_na(history)):
             yield pair.message, pair.places
+
+    def _partners_na(self, history: History) -> float:
+        """What sums of partners may differ by: what matters, and what the certified angles do of themselves."""
+        expected = self._expected(history)
+        matters = expected.partner_na or self.thresholds.partner_na
+        if history.turned_arcsec is None or not expected.scale_deg_per_h_per_ma:
+            return matters
+        return matters + partners.by_angles_na(
+            history.turned_arcsec, expected.scale_deg_per_h_per_ma, expected.g_drift_deg_per_h
+        )
 
     def _expected(self, history: History) -> Expectations:
         return self.types.get(history.gyro_type or "", Expectations())

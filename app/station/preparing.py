@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from app.station.contracts import Place
+from app.station.contracts import Certified, Place
 from app.station.keeping import durable
 from app.station.keeping.entries import Opened, Planned
 from app.station.keeping.spool import Spool
@@ -23,17 +23,20 @@ SIXTEEN: Final = tuple(
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """The certificates' positions as this computer heard of them last, by stand."""
+    """The certificates' positions as this computer heard of them last, by stand: θ, ψ and how far it is turned."""
 
     file: Path
 
-    def places(self, stand: str) -> tuple[Place, ...]:
+    def positions(self, stand: str) -> tuple[Certified, ...]:
         """Positions of a stand; empty when nothing is remembered."""
-        return tuple(Place(*place) for place in self._read().get(stand, ()))
+        kept = self._read().get(stand, ())
+        return tuple(
+            Certified(Place(*place), turned) for *place, turned in kept if len(place) == len(Place._fields)
+        )
 
-    def remember(self, stand: str, places: tuple[Place, ...]) -> None:
+    def remember(self, stand: str, positions: tuple[Certified, ...]) -> None:
         """Keep a stand's positions."""
-        known = self._read() | {stand: [list(place) for place in places]}
+        known = self._read() | {stand: [[*item.place, item.turned_arcsec] for item in positions]}
         durable.make_folders(self.file.parent)
         durable.write_whole(self.file, json.dumps(known, ensure_ascii=False, indent=1).encode())
 
@@ -61,17 +64,18 @@ class Preparing:
         certified, gyro_type = self._certified()
         if certified:
             self.memory.remember(begun.stand, certified)
-        remembered = self.memory.places(begun.stand)
+        remembered = self.memory.positions(begun.stand)
         choices = {
             "option": self.asked,
-            "certificate": certified,
-            "remembered": remembered,
+            "certificate": tuple(item.place for item in certified),
+            "remembered": tuple(item.place for item in remembered),
             "sixteen": SIXTEEN,
         }
         source, places = next((source, places) for source, places in choices.items() if places)
-        self.spool.add(Planned(places, source, self.gyro_type or gyro_type))
+        turned = max((item.turned_arcsec for item in certified or remembered), default=None)
+        self.spool.add(Planned(places, source, self.gyro_type or gyro_type, turned))
 
-    def _certified(self) -> tuple[tuple[Place, ...], str | None]:
+    def _certified(self) -> tuple[tuple[Certified, ...], str | None]:
         """Positions of the session's certificate and the gyro's type; nothing when the service is away."""
         begun = self.spool.history.begun
         assert begun is not None

@@ -15,7 +15,7 @@ from app.station.instruments.dialogue import Errors
 from app.station.instruments.exchanges import Command
 from app.station.instruments.toml_tables import Table, load_toml
 from app.station.instruments.visa import Connection, attribute_names
-from app.station.judgement.checks import Expectations, Thresholds
+from app.station.judgement.expectations import Expectations, Thresholds
 from app.station.judgement.settling import RestRule
 from solver.errors import Message
 

@@ -90,7 +90,7 @@ def odd_pairs(means: Mapping[Place, Currents], tolerance_na: float) -> tuple[Odd
     means
         Mean currents, mA, of the places measured so far.
     tolerance_na
-        What noise and certified angles may do to a sum (`tolerance_na`), nA.
+        What noise, drift and certified angles (`by_angles_na`) may do to a difference of sums, nA.
 
     Returns
     -------
@@ -109,32 +109,21 @@ def odd_pairs(means: Mapping[Place, Currents], tolerance_na: float) -> tuple[Odd
     return tuple(found)
 
 
-def tolerance_na(
-    u_mean_na: float,
-    angle_arcsec: float,
-    scale_deg_per_h_per_ma: float,
-    *,
-    g_drift_deg_per_h: float = 0.0,
-    coverage: float = 6.0,
-) -> float:
-    """What a difference of sums may be in a good session, nA.
+def by_angles_na(angle_arcsec: float, scale_deg_per_h_per_ma: float, g_drift_deg_per_h: float = 0.0) -> float:
+    """What certified angles do to a difference of sums at most, nA.
 
     Parameters
     ----------
-    u_mean_na
-        Standard uncertainty of a mean current.
     angle_arcsec
         Largest certified rotation √(α² + β² + γ²) of a position.
     scale_deg_per_h_per_ma
         Smallest scale factor of the gyro.
     g_drift_deg_per_h
         √(ωg² + ωк²) + 2·|ωн|.
-    coverage
-        Standard deviations of noise allowed; a sum has √2 of those of a mean, the median of the others less.
     """
     earth = deg_per_h_from_rad_per_s(EARTH_RATE)
-    by_angles = 4.0 * rad_from_arcsec(angle_arcsec) * (earth + g_drift_deg_per_h)
-    return coverage * 2.0 * u_mean_na + by_angles / abs(scale_deg_per_h_per_ma) * _NA_PER_MA
+    rate = 4.0 * rad_from_arcsec(angle_arcsec) * (earth + g_drift_deg_per_h)
+    return rate / abs(scale_deg_per_h_per_ma) * _NA_PER_MA
 
 
 def _sums(means: Mapping[Place, Currents]) -> Iterable[tuple[tuple[Place, Place], Currents]]:

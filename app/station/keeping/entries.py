@@ -86,11 +86,15 @@ class Resumed:
 
 @dataclass(frozen=True, slots=True)
 class Planned:
-    """The positions in their order and where they are from (`certificate`, `remembered`, `option`, `sixteen`)."""
+    """The positions in their order and where they are from (`certificate`, `remembered`, `option`, `sixteen`).
+
+    `turned_arcsec` is the largest rotation that the stand's certificate states; None where none was heard of.
+    """
 
     places: tuple[Place, ...]
     source: str
     gyro_type: str | None = None
+    turned_arcsec: float | None = None
     kind: Literal["planned"] = "planned"
 
 

@@ -86,6 +86,8 @@ class History:
     """How often a program took the run up."""
     places: tuple[Place, ...] = ()
     gyro_type: str | None = None
+    turned_arcsec: float | None = None
+    """Largest rotation that the stand's certificate states, None where none was heard of."""
     session: int | None = None
     warmed: bool = False
     attempts: list[Attempt] = field(default_factory=list)
@@ -112,6 +114,7 @@ class History:
                 self.starts += 1
             case Planned():
                 self.places, self.gyro_type = entry.places, entry.gyro_type
+                self.turned_arcsec = entry.turned_arcsec
             case Opened():
                 self.session = entry.session
             case Warmed():

@@ -1,10 +1,12 @@
 """The service as the station needs it: one attempt per call, raising `Unreachable` or `ServerRefused`."""
 
+import math
+from collections.abc import Mapping
 from dataclasses import asdict
 from types import TracebackType
 from typing import Any, Self
 
-from app.station.contracts import Place
+from app.station.contracts import Certified, Place
 from app.station.keeping.entries import Begun
 from app.station.keeping.history import Attempt
 from app.station.sending.client import asked, connected, currents_request
@@ -25,11 +27,14 @@ class Service:
         key = {"Idempotency-Key": f"station-{begun.run}"}
         return int(asked(self._client, "POST", "/sessions", "id", json=body, headers=key)["id"])
 
-    def described(self, session: int) -> tuple[tuple[Place, ...], str]:
+    def described(self, session: int) -> tuple[tuple[Certified, ...], str]:
         """Positions of the certificate that the session names, in its order, and the gyro's type."""
         said = asked(self._client, "GET", f"/sessions/{session}", "positions", "type")
-        places = [Place(item["theta_deg"], item["psi_deg"]) for item in said["positions"]]
-        return tuple(dict.fromkeys(places)), str(said["type"])
+        found = {
+            Place(item["theta_deg"], item["psi_deg"]): _turned(item["certified"])
+            for item in said["positions"]
+        }
+        return tuple(Certified(*item) for item in found.items()), str(said["type"])
 
     def put_record(self, session: int, attempt: Attempt, content: bytes) -> None:
         """Bring a record; the same bytes again change nothing. An answer that does not name it is none."""
@@ -71,3 +76,8 @@ class Service:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _turned(angles: Mapping[str, float]) -> float:
+    """√(α² + β² + γ²), arcsec."""
+    return math.hypot(angles["alpha_arcsec"], angles["beta_arcsec"], angles["gamma_arcsec"])

@@ -286,3 +286,12 @@ def test_parameters_that_were_not_found_are_no_success(laboratory, cycle):
     assert run.code == 1
     assert unknown
     assert f"Not determined from these positions: {', '.join(unknown)}." in run.err
+
+
+def test_a_stand_whose_certificate_states_degrees_is_no_stand_that_stands_wrong(laboratory, cycle):
+    bench = bench_of("skewed")
+    stand = laboratory.stand_of(bench)
+    with instruments(bench) as served:
+        run = cycle(served, stand, "--positions", "8")
+    assert run.code == 0, run.err
+    assert run.codes == []

@@ -9,7 +9,7 @@ import numpy as np
 
 from app.exchange.rows import CurrentRecord
 from app.station.clock import Clock
-from app.station.contracts import Acquisition, Block, Currents, Place, StandStatus
+from app.station.contracts import Acquisition, Block, Certified, Currents, Place, StandStatus
 from app.station.controls import Controls
 from app.station.cycle import Cycle
 from app.station.finishing import Finishing
@@ -168,9 +168,9 @@ class UnrealService:
         self._answer()
         return self.sessions.setdefault(begun.run, len(self.sessions) + 1)
 
-    def described(self, session: int) -> tuple[tuple[Place, ...], str]:
+    def described(self, session: int) -> tuple[tuple[Certified, ...], str]:
         self._answer()
-        return self.places, "GVK-6"
+        return tuple(Certified(place, 15.0) for place in self.places), "GVK-6"
 
     def put_record(self, session: int, attempt: Attempt, content: bytes) -> None:
         self._answer()

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from app.station.instruments.description import SIMULATED, station_file
-from app.station.judgement.checks import Expectations, Take, Thresholds, judged
+from app.station.judgement.checks import Take, judged
+from app.station.judgement.expectations import Expectations, Thresholds
 from simdevice.ammeter import Ammeter, Channel
 from simdevice.bench import Bench, position_record
 from simdevice.certificate import Position, sixteen_positions

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.station.contracts import Currents, Place
-from app.station.judgement.partners import odd_pairs, partner_of, tolerance_na
+from app.station.judgement.partners import by_angles_na, odd_pairs, partner_of
 from simdevice.ammeter import Ammeter
 from simdevice.bench import Bench, position_record, steady_currents
 from simdevice.certificate import Position, certify
@@ -67,9 +67,7 @@ def test_sums_are_the_same_for_all_pairs_with_anisoelasticity_too(latitude, wn):
 @pytest.mark.parametrize("size", [15.0, 60.0, 300.0, 7200.0])
 def test_certified_angles_do_no_more_than_the_bound_says(size):
     """For 50 certificates whose angles turn each position by exactly so much; the bound is not generous either."""
-    bound = tolerance_na(
-        0.0, size, SCALE * 0.98, g_drift_deg_per_h=np.hypot(6.0, 2.0)
-    )  # smallest singular value
+    bound = by_angles_na(size, SCALE * 0.98, np.hypot(6.0, 2.0))  # smallest singular value
     worst = 0.0
     for seed in range(50):
         found = means(perfect(spread_arcsec=size, seed=seed))
@@ -80,8 +78,7 @@ def test_certified_angles_do_no_more_than_the_bound_says(size):
 
 def test_the_number_of_the_derivation():
     """60″ · 2 · 21 °/h / 2063 (°/h)/mA are 6 nA for a sum, twice that for a difference."""
-    assert tolerance_na(0.0, 60.0, 2063.0, g_drift_deg_per_h=21.0 - 15.041) == pytest.approx(11.85, abs=0.01)
-    assert tolerance_na(1.0, 0.0, 2063.0) == 12.0
+    assert by_angles_na(60.0, 2063.0, 21.0 - 15.041) == pytest.approx(11.85, abs=0.01)
 
 
 @pytest.mark.parametrize("by_deg", [90.0, 180.0, 270.0])
@@ -115,7 +112,7 @@ def test_noise_within_its_coverage_is_let_through():
     """12 u are 7.6 standard deviations √2·√(1 + π/(2·7))·u of a difference: never among 8 pairs in 100 sessions."""
     bench = perfect()
     for seed in range(100):
-        assert odd_pairs(means(bench, noise_na=5.0, seed=seed), tolerance_na(5.0, 0.0, SCALE)) == ()
+        assert odd_pairs(means(bench, noise_na=5.0, seed=seed), 12 * 5.0) == ()
 
 
 def test_fewer_than_three_pairs_tell_nothing():
