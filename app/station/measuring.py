@@ -22,6 +22,12 @@ _MOVED: Final = Message(
     "stand-was-moved", "The stand was moved while nobody looked on; the record is begun anew."
 )
 _EMPTY: Final = Message("acquisition-empty", "The ammeter acquired nothing; the record is begun anew.")
+_TAKEN: Final = Message(
+    "ammeter-taken",
+    "The ammeter has another acquisition than the one begun here: another program uses it. The record is begun anew.",
+)
+_MOST_LOST: Final = 3
+"""Acquisitions lost one after the other; then a person has to see to it."""
 _FEWEST: Final = 2
 _STANDSTILL_DEG: Final = 1e-3
 _STANDSTILL_S: Final = 20.0
@@ -48,12 +54,38 @@ def measure(at: Workplace, target: Target) -> None:
             else:
                 _take_up(at, attempt, blocks)
             overload = _collect(at, attempt, blocks)
-        except (TargetLeft, _Lost):
+        except TargetLeft:
+            return
+        except _Lost:
+            _require_progress(at, attempt)
             return
         except (TakeFailed, InstrumentFault) as failed:
             _fail(at, attempt, failed)
             return
+        at.lost = 0
         _judge(at, attempt, blocks, overload)
+
+
+def _require_progress(at: Workplace, attempt: Attempt) -> None:
+    """Do not begin anew for ever: raise `TakeFailed` when one acquisition after the other was lost."""
+    at.lost += 1
+    if at.lost < _MOST_LOST:
+        return
+    if attempt.abandoned is not None and attempt.abandoned.code == _TAKEN.code:
+        raise TakeFailed(
+            problem(
+                "ammeter-shared",
+                "Another program uses the ammeter, and ends this one's acquisitions again and again. Let one program "
+                "at a time use it, then start the same command again.",
+            )
+        )
+    raise TakeFailed(
+        problem(
+            "acquisitions-lost",
+            "Three acquisitions were lost one after the other; the log says why. See to it, then start the same "
+            "command again.",
+        )
+    )
 
 
 def _begin(at: Workplace, target: Target) -> Attempt:
@@ -203,8 +235,10 @@ def _take_up(at: Workplace, attempt: Attempt, blocks: BlockFile) -> None:
     assert acquiring is not None
     if blocks.samples >= begun.samples:
         return
-    if at.ammeter.status().label != acquiring.label:
-        _give_up(at, attempt, _FORGOTTEN)
+    label = at.ammeter.status().label
+    if label != acquiring.label:
+        # Before its first sample came the acquisition may never have begun: then the label is that of an earlier one.
+        _give_up(at, attempt, _TAKEN if label and blocks.samples else _FORGOTTEN)
     status = at.look()
     if status.moving or not status.homed or apart_deg(status.place, attempt.target.place) > at.at_place_deg:
         _give_up(at, attempt, _MOVED)
@@ -225,7 +259,9 @@ def _collect(at: Workplace, attempt: Attempt, blocks: BlockFile) -> bool:
     had = blocks.samples
     while blocks.samples < begun.samples:
         acquired = at.ammeter.status()
-        if acquired.label not in (None, acquiring.label) or acquired.samples < blocks.samples:
+        if acquired.label not in (None, 0, acquiring.label):
+            _give_up(at, attempt, _TAKEN)
+        if acquired.label == 0 or acquired.samples < blocks.samples:
             _give_up(at, attempt, _FORGOTTEN)
         overload = acquired.overload
         _require_at(at, at.watch(), attempt.target.place)

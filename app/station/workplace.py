@@ -75,6 +75,8 @@ class Workplace:
     at_place_deg: float = 0.01
     """How far the encoders may be from the place commanded."""
     block_samples: int = 2000
+    lost: int = 0
+    """Acquisitions lost one after the other since this program began."""
     _looked: tuple[float, StandStatus] | None = None
 
     @property

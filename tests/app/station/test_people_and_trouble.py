@@ -290,6 +290,26 @@ def test_an_ammeter_that_forgot_begins_the_same_take_anew_with_a_new_label(room)
     assert len(room.service.records[Target(*PLACES[1])]) == 1
 
 
+def test_an_ammeter_that_somebody_else_uses_too_is_named_and_not_fought_over(room):
+    def other_program(first: int) -> None:
+        room.ammeter.label = 7
+
+    room.ammeter.before_fetch = other_program
+    with pytest.raises(NotFinished, match="Another program uses the ammeter"):
+        room.run()
+    lost = history_in(room.folder).attempts
+    assert [attempt.abandoned.code for attempt in lost] == ["ammeter-taken"] * 3
+    room.ammeter.before_fetch = lambda first: None
+    assert room.run().result is not None
+
+
+def test_acquisitions_that_are_lost_again_and_again_are_left_to_a_person(room, monkeypatch):
+    monkeypatch.setattr(type(room.ammeter), "start", lambda self, label, *what: setattr(self, "label", label))
+    with pytest.raises(NotFinished, match="Three acquisitions were lost"):
+        room.run()
+    assert {item.abandoned.code for item in history_in(room.folder).attempts} == {"acquisition-empty"}
+
+
 def test_a_stand_that_lost_its_reference_is_homed_again(room):
     def power_cut() -> None:
         room.stand.homed = False
