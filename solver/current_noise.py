@@ -26,7 +26,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy import special
 
+from solver.errors import Message
 from solver.records import Array, Observations
+from solver.units import ma_from_ampere
 
 _FEWEST: Final = 3
 """Estimates of a channel, below which nothing can be said of how they differ."""
@@ -44,11 +46,45 @@ class CurrentNoise(NamedTuple):
 
 def current_noise(observations: Observations) -> CurrentNoise | None:
     """The noise that a session is solved, propagated and judged with; None without u(J)."""
+    stated = stated_noise(observations)
+    if stated is None:
+        return None
+    x, y = (moderated(stated.u[:, channel], stated.dof[:, channel]) for channel in range(2))
+    return CurrentNoise(np.stack((x[0], y[0]), axis=1), np.stack((x[1], y[1]), axis=1))
+
+
+def stated_noise(observations: Observations) -> CurrentNoise | None:
+    """u(J) and ν as they went in; None without u(J)."""
     at = observations
     if at.u_jx is None or at.u_jy is None:
         return None
-    x, y = moderated(at.u_jx, at.dof_jx), moderated(at.u_jy, at.dof_jy)
-    return CurrentNoise(np.stack((x[0], y[0]), axis=1), np.stack((x[1], y[1]), axis=1))
+    return CurrentNoise(np.stack((at.u_jx, at.u_jy), axis=1), np.stack((at.dof_jx, at.dof_jy), axis=1))
+
+
+def about_moderation(stated: CurrentNoise, used: CurrentNoise) -> Message | None:
+    """Say what u(J) was stated and what is used in its place; None where they are the same."""
+    if np.array_equal(stated.u, used.u) and np.array_equal(stated.dof, used.dof):
+        return None
+    ranges = {
+        f"{part}_{axis}": _range(values[:, channel])
+        for part, values in (
+            ("stated", ma_from_ampere(stated.u)), ("used", ma_from_ampere(used.u)),
+            ("dof", stated.dof), ("used_dof", used.dof),
+        )
+        for channel, axis in enumerate("xy")
+    }  # fmt: skip
+    return Message(
+        "moderated-uncertainty",
+        "u(J) was itself estimated with few degrees of freedom, so each is moderated by the other positions of its "
+        "channel. u(Jx): stated %(stated_x)s mA with ν %(dof_x)s, used %(used_x)s mA with ν %(used_dof_x)s. "
+        "u(Jy): stated %(stated_y)s mA with ν %(dof_y)s, used %(used_y)s mA with ν %(used_dof_y)s.",
+        ranges,
+    )
+
+
+def _range(values: Array) -> str:
+    ends = [f"{float(end):.3g}".replace("inf", "∞") for end in (values.min(), values.max())]
+    return "…".join(dict.fromkeys(ends))
 
 
 def moderated(u: Array, dof: Array) -> tuple[Array, Array]:

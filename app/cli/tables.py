@@ -102,6 +102,8 @@ def _limits(answer: Mapping[str, Any]) -> Iterator[str]:
     if factors:
         span = " to ".join(dict.fromkeys(f"{factor:.2f}" for factor in (min(factors), max(factors))))
         yield f"U is k·u for 95 %, k = {span}; it comes mostly from {'; '.join(parts)}"
+    if answer.get("current_noise"):
+        yield answer["current_noise"]["conclusion"]["message"]
     if answer.get("monte_carlo"):
         yield f"Monte Carlo: {answer['monte_carlo']['conclusion']['message']}"
     if answer.get("model"):

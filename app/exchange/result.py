@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from app.exchange.current_noise import current_noise_json
 from app.exchange.examination import angle_deg
 from app.exchange.json_values import Json, finite, message_json
 from app.exchange.limits import budget_json, expanded_json, in_lab
@@ -68,7 +69,9 @@ def _one(calibration: Calibration, method: Method) -> Json:
     }
     if isinstance(answer, Failure):
         return {**head, "error": message_json(answer.message), "iterations": _iterations(answer.iterations)}
-    return {**head, **_estimate(answer, calibration.observations, calibration.budget(method))}
+    solved = calibration.solved.get(method)
+    noise = current_noise_json(calibration.observations, None if solved is None else solved.widening)
+    return {**head, **_estimate(answer, calibration.observations, calibration.budget(method)), **noise}
 
 
 def _estimate(estimate: Estimate, observations: Observations, budget: Budget | None) -> Json:

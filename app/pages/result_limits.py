@@ -4,8 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from app.exchange.json_values import message_from
 from app.figures import Figure, figure, plain, significant
-from app.i18n import gettext, marked
+from app.i18n import gettext, marked, translate
 from app.pages import labels
 from solver.records import PARAMETERS
 
@@ -64,6 +65,7 @@ class Budget:
     def __init__(self, answer: Json) -> None:
         self._lines: Sequence[Json] = answer.get("budget") or ()
         self._parameters: Json = answer.get("parameters") or {}
+        self._noise: Json = answer.get("current_noise") or {}
         self.shown = sorted(self._lines, key=self._largest, reverse=True)[:_MOST_BARS]
 
     def __bool__(self) -> bool:
@@ -125,6 +127,11 @@ class Budget:
             for line, names in by_line.items()
         ]
         return "; ".join(parts) + "." if parts else ""
+
+    @property
+    def moderation(self) -> str:
+        """Which u(J) was stated and which used, where they differ."""
+        return translate(message_from(self._noise["conclusion"])) if self._noise else ""
 
 
 def _source(line: Json) -> str:

@@ -79,6 +79,10 @@ class Calibration(Outgoing):
     fit: dict[str, Any] | None = None
     iterations: list[dict[str, Any]] | None = None
     budget: list[dict[str, Any]] | None = None
+    current_noise: dict[str, Any] | None = Field(
+        default=None,
+        description="Where u(J) was stated with finite degrees of freedom: as stated and as used, by channel.",
+    )
     monte_carlo: dict[str, Any] | None = None
     model: dict[str, Any] | None = None
     diagnosis: list[dict[str, Any]] | None = None
