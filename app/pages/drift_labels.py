@@ -10,6 +10,7 @@ from app import figures
 from app.i18n import gettext, marked, translate
 from app.pages import labels
 from app.pages.labels import Mark
+from app.services.drift.acts import Act
 from app.services.drift.due import Due
 from app.services.drift.views import EventView
 from solver.drift.control.false_alarms import Chances
@@ -49,6 +50,12 @@ EVENT_KINDS: Final = {
     "repair": marked("Repair"), "adjustment": marked("Adjustment"), "moved": marked("Moved"),
     "method": marked("Change of method"), "other": marked("Other"), "certificate": marked("New certificate"),
     "solver": marked("New solver version"), "stand": marked("Another stand"),
+}  # fmt: skip
+
+_ACTS: Final = {
+    "event-entered": marked("event entered"), "event-withdrawn": marked("event withdrawn"),
+    "baseline-frozen": marked("baseline frozen"), "baseline-retired": marked("baseline retired"),
+    "alarm-acknowledged": marked("alarm acknowledged"),
 }  # fmt: skip
 
 _SOURCES: Final = {
@@ -160,6 +167,15 @@ def event_label(event: EventView) -> str:
 def event(kind: str) -> str:
     """What happened."""
     return gettext(EVENT_KINDS.get(kind, kind))
+
+
+def act(done: Act) -> str:
+    """What a person did about the drift, in words."""
+    said = gettext(_ACTS[done.kind])
+    if not done.about:
+        return said
+    about = event(done.about) if done.kind.startswith("event") else alarm(done.about).word
+    return f"{said} ({about})"
 
 
 def source(name: str) -> str:

@@ -1,6 +1,8 @@
 """The first screen: what is open, what was found last."""
 
 from dataclasses import dataclass
+from datetime import timedelta
+from typing import Final
 
 from app.services import sessions
 from app.services.lab import Work
@@ -29,6 +31,9 @@ class Overview:
 
 _UNDER_WAY = ("measuring", "ready", "solving")
 _MOST_OPEN = 20
+_REVIEWED: Final = timedelta(days=30)
+_MOST_RESULTS: Final = 200
+_WORST: Final = ("fails", "undetermined", "conditional", "no-limit", "conforms")
 
 
 def overview(work: Work, limit: int = 12) -> Overview:
@@ -42,6 +47,17 @@ def overview(work: Work, limit: int = 12) -> Overview:
         *(item for item in unsolved if item.state in ("measuring", "ready")),
     ]
     return Overview(sessions.detail(work, waiting[0].id) if waiting else None, recent)
+
+
+def results(work: Work, limit: int) -> tuple[SessionView, ...]:
+    """The metrologist's queue: sessions of the last 30 days with a result, the worst first, of those the newest."""
+    found = sessions.sessions(work, since=work.now - _REVIEWED, limit=_MOST_RESULTS).items
+    solved = sorted((item for item in found if item.result), key=lambda item: item.started_at, reverse=True)
+    return tuple(sorted(solved, key=_badness)[:limit])
+
+
+def _badness(session: SessionView) -> int:
+    return _WORST.index(session.result.verdict) if session.result else len(_WORST)
 
 
 def stands_now(work: Work, stand_names: tuple[str, ...]) -> tuple[StandNow, ...]:

@@ -2,10 +2,10 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import sqlalchemy as sa
-from sqlalchemy.orm import Session, aliased, selectinload, undefer
+from sqlalchemy.orm import InstrumentedAttribute, Session, aliased, selectinload, undefer
 
 from app.store.tables import (
     Alarm,
@@ -19,6 +19,8 @@ from app.store.tables import (
     MeasuringSession,
     Stand,
 )
+
+Row = TypeVar("Row", Alarm, Baseline, Event)
 
 
 def locked(db: Session, gyro_id: int | None, stand_id: int | None) -> None:
@@ -252,3 +254,10 @@ def subject_names(db: Session, gyro_id: int | None, stand_id: int | None) -> tup
         db.scalar(sa.select(Gyro.serial).where(Gyro.id == gyro_id)),
         db.scalar(sa.select(Stand.name).where(Stand.id == stand_id)),
     )
+
+
+def latest(db: Session, table: type[Row], column: InstrumentedAttribute[Any], limit: int) -> Sequence[Row]:
+    """Rows by a time of theirs, the newest first; those without it left out."""
+    return db.scalars(
+        sa.select(table).where(column.is_not(None)).order_by(column.desc(), table.id.desc()).limit(limit)
+    ).all()

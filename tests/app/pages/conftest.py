@@ -146,6 +146,14 @@ def quality(application: FastAPI, lab: Lab) -> TestClient:
 
 
 @pytest.fixture
+def metrologist(application: FastAPI, lab: Lab) -> TestClient:
+    """Judges too, and answers for the results."""
+    with lab.write(access.SYSTEM) as work:
+        access.add_account(work, "anna", "metrologist", None, "A. Sokolova")
+    return _signed_in(application, lab, "anna")
+
+
+@pytest.fixture
 def stocked(lab: Lab) -> Lab:
     """A laboratory with a gyro, its type's limits, a stand and its certificate."""
     with lab.write(access.SYSTEM) as work:

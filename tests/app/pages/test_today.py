@@ -1,12 +1,18 @@
-from datetime import UTC, datetime
+import re
+from datetime import UTC, datetime, timedelta
 
 import pytest
 from fastapi.testclient import TestClient
 
 from app.exchange.rows import MeansRow
 from app.services import access, calibrations, gyros, ingest, sessions, stands
-from app.services.lab import Lab
+from app.services.drift import alarms, events
+from app.services.drift.alarms import Finding
+from app.services.lab import Lab, Work
+from app.services.lookup import find_gyro
 from app.services.sessions import NewSession
+from app.store.tables import Calibration, CalibrationParameter, DriftStudy
+from solver.records import PARAMETERS
 
 
 def _open(lab: Lab, measured: int, **given: float) -> int:
@@ -86,3 +92,98 @@ def test_the_day_is_written_out(technician: TestClient, lab: Lab, language: str,
     page = technician.get("/", headers={"accept-language": language}).text
     now = datetime.now(UTC).astimezone()
     assert (now.strftime(day) if language == "en" else str(now.year)) in page
+
+
+def _alarm(work: Work, gyro: str, kind: str, parameter: str, calibration: int) -> None:
+    """As a study would leave it."""
+    finding = Finding(parameter, kind, calibration, calibration, str(work.now), str(work.now), "Found.", {})
+    study = DriftStudy(gyro_id=find_gyro(work, gyro).id, method="least-squares")
+    alarms.take_in(work, study, [finding], [calibration])
+
+
+def _result(work: Work, gyro: str, days_ago: float, value: float | None = 0.0) -> int:
+    gyros.add_gyro(work, gyro, "GVK-6")
+    new = NewSession(gyro, "S1", new_start=True, started_at=work.now - timedelta(days=days_ago))
+    row = Calibration(
+        session_id=sessions.open_session(work, new).id, revision=1, method="least-squares", solver_version="2.0.0",
+        input_hash=gyro, certificate_id=1, inputs=[], result="{}", result_digest="", chi2=24.0, fit_dof=24,
+        created_at=work.now, created_by="irina",
+        parameters=[
+            CalibrationParameter(method="least-squares", parameter=name, value=value, standard_uncertainty=0.004,
+                                 coverage_factor=2.0, u_noise=0.003)
+            for name in PARAMETERS
+        ],
+    )  # fmt: skip
+    work.db.add(row)
+    work.db.flush()
+    return row.id
+
+
+@pytest.fixture
+def alarming(stocked: Lab) -> Lab:
+    """Six gyros with a serious alarm each, a drifting one, and one that is ten days overdue."""
+    with stocked.write(access.SYSTEM) as work:
+        gyros.set_interval(work, "GVK-6", 90)
+        gyros.set_limits(work, "GVK-6", {"w0x": (-6.0, 6.0)})
+        for number in range(6):
+            _alarm(work, f"05{number}", "step", "w0x", _result(work, f"05{number}", 1.0 + number))
+        _alarm(work, "0600", "trend", "w0y", _result(work, "0600", 1.0))
+        _result(work, "0700", 100.0)
+        _result(work, "0800", 2.0, 7.0)
+    return stocked
+
+
+def test_every_finding_is_two_clicks_away_however_many_alarms_there_are(
+    technician: TestClient, alarming: Lab
+) -> None:
+    page = technician.get("/").text
+    assert page.count("#alarm-") == 5
+    assert "2 more gyros or stands with alarms" in page
+    for kind, gyro, count in (("trend", "0600", 1), ("step", "050", 6)):
+        assert re.search(rf'<a href="/alarms\?kind={kind}">.*?<span class="n">{count}</span>', page)
+        assert f'href="/gyros/{gyro}?' in technician.get(f"/alarms?kind={kind}").text
+
+
+def test_what_is_overdue_stands_on_the_first_screen(technician: TestClient, alarming: Lab) -> None:
+    page = technician.get("/").text
+    overdue = page[page.index('id="overdue"') : page.index('id="queue"')]
+    assert "10 days ago" in overdue
+    assert 'href="/gyros/0700"' in overdue
+    assert 'href="/gyros/0600"' not in overdue
+
+
+@pytest.mark.parametrize(
+    ("role", "parts"),
+    [
+        ("technician", ["now", "drift", "overdue", "queue"]),
+        ("metrologist", ["results", "drift", "overdue", "now", "queue"]),
+        ("quality", ["overdue", "drift", "acts", "now", "queue"]),
+    ],
+)
+def test_the_queue_is_that_of_the_role(
+    request: pytest.FixtureRequest, alarming: Lab, role: str, parts: list[str]
+) -> None:
+    with alarming.write(access.SYSTEM) as work:
+        events.add(work, "repair", work.now, "lead resoldered", gyro="0600")
+    page = request.getfixturevalue(role).get("/").text
+    assert re.findall(r'<h2 id="(\w+)"', page) == parts
+    assert page.count('class="btn primary') == 1
+
+
+def test_a_metrologist_sees_the_worst_result_first(metrologist: TestClient, alarming: Lab) -> None:
+    page = metrologist.get("/").text
+    shown = page[page.index('id="results"') : page.index('id="drift"')]
+    assert re.findall(r'class="id" href="/gyros/(\w+)"', shown)[0] == "0800"
+    assert "0700" not in shown, "of the last 30 days"
+
+
+def test_quality_sees_who_did_what(quality: TestClient, alarming: Lab) -> None:
+    with alarming.write(access.SYSTEM) as work:
+        made = events.add(work, "repair", work.now, "lead resoldered", gyro="0600")
+        alarms.acknowledge(work, alarms.alarms(work, gyro="0600")[0].id, "repair", "see the order")
+        events.withdraw(work, made.id)
+    page = quality.get("/").text
+    shown = page[page.index('id="acts"') : page.index('id="now"')]
+    for said in ("event entered (Repair)", "event withdrawn (Repair)", "alarm acknowledged (Drifting)"):
+        assert said in shown
+    assert "see the order" in shown
