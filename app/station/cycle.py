@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
-from app.errors import AppError, problem
+from app.errors import AppError, Problem, problem
 from app.station.comparing import compare
 from app.station.contracts import EmergencyStop, InstrumentFault, InstrumentLost, Place
 from app.station.controls import StopAsked
@@ -136,18 +136,11 @@ class Cycle:
             at.watch()
             currents = at.ammeter.reading()
             warm = still.add(at.clock.lab_s(), currents)
-            at.live.show(currents=currents, settled=warm)
+            at.live.show(currents=currents, settled=warm is True)
             if warm:
                 break
             if deadline.passed:
-                raise TakeFailed(
-                    problem(
-                        "not-warm",
-                        "The currents still creep after %(minutes).0f minutes. Look at the gyro's heating and start "
-                        "the same command again.",
-                        minutes=at.patience.warm_up_s / 60.0,
-                    )
-                )
+                raise TakeFailed(_not_warm(at.patience.warm_up_s / 60.0, creeping=warm is False))
             at.wait()
         at.spool.add(Warmed())
 
@@ -216,3 +209,21 @@ class Cycle:
         with suppress(SpoolFailed):  # that is why the cycle ends
             for item in error.problems if isinstance(error, AppError) else ():
                 self.at.spool.note("error", item.message)
+
+
+def _not_warm(minutes: float, *, creeping: bool) -> Problem:
+    """Why the gyro is not known to be warm: it is seen to creep, or nothing is seen for noise."""
+    if creeping:
+        return problem(
+            "not-warm",
+            "The currents still creep after %(minutes).0f minutes. Look at the gyro's heating and start "
+            "the same command again.",
+            minutes=minutes,
+        )
+    return problem(
+        "warmth-unknown",
+        "After %(minutes).0f minutes the currents are still too noisy to tell whether they creep. Look for vibration "
+        "or a loose plug; if this noise is the gyro's own, give [warm_up] in the station's file a longer window_s or "
+        "a larger limit_na_per_s.",
+        minutes=minutes,
+    )

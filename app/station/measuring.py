@@ -26,6 +26,14 @@ _TAKEN: Final = Message(
     "ammeter-taken",
     "The ammeter has another acquisition than the one begun here: another program uses it. The record is begun anew.",
 )
+_UNREST: Final = problem(
+    "not-settled", "The currents do not settle. Look for vibration, draughts, a loose plug."
+)
+_UNSURE: Final = problem(
+    "rest-unknown",
+    "The currents are too noisy to tell whether they have settled. Look for vibration or a loose plug; if this "
+    "noise is the gyro's own, give [settling] in the station's file a longer window_s or a larger limit_na_per_s.",
+)
 _MOST_LOST: Final = 3
 """Acquisitions lost one after the other; then a person has to see to it."""
 _FEWEST: Final = 2
@@ -208,15 +216,11 @@ def settle(at: Workplace, target: Target | None = None, take: int = 0) -> None:
         at.watch()
         currents = at.ammeter.reading()
         settled = still.add(at.clock.lab_s(), currents)
-        at.live.show(currents=currents, settled=settled)
+        at.live.show(currents=currents, settled=settled is True)
         if settled:
             return
         if deadline.passed:
-            raise TakeFailed(
-                problem(
-                    "not-settled", "The currents do not settle. Look for vibration, draughts, a loose plug."
-                )
-            )
+            raise TakeFailed(_UNREST if settled is False else _UNSURE)
         at.wait()
 
 

@@ -1,5 +1,6 @@
 """The judge by rules: what it makes of a laboratory's thresholds, a type's expectations and a run's history."""
 
+import numpy as np
 import pytest
 
 from app.station.contracts import Currents, Place
@@ -33,3 +34,15 @@ def test_the_certificates_angles_are_allowed_for(gyro_type, turned_arcsec, allow
     assert [places for _, places in RULES.odd(pairs(1.01 * allowed_na), history)] == [
         (Place(0.0, 0.0), Place(0.0, 180.0))
     ]
+
+
+@pytest.mark.parametrize(
+    ("noise_na", "creep_na_per_s", "still"), [(1.0, 0.0, True), (1e3, 0.0, None), (1.0, 0.1, False)]
+)
+def test_currents_that_nobody_can_tell_of_are_not_said_to_creep(noise_na, creep_na_per_s, still):
+    """480 readings in 4800 s: u of the slope is 12^½·s/(480^½·4800 s), 3e-5 nA/s and 0.03 nA/s; the limit is 0.01."""
+    noise = np.random.default_rng(12).normal(0.0, noise_na, (481, 2))
+    watch = RULES.warming()
+    for number, (x, y) in enumerate(noise + creep_na_per_s * 10.0 * np.arange(481)[:, None]):
+        told = watch.add(10.0 * number, Currents(x * 1e-6, y * 1e-6))
+    assert told is still

@@ -3,7 +3,7 @@
 import signal
 import threading
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -11,7 +11,8 @@ from unreal import PLACES, Room, true_record
 
 from app.errors import Invalid, problem
 from app.station import cycle, finishing
-from app.station.contracts import EmergencyStop, InstrumentFault, InstrumentLost, Place
+from app.station.clock import Deadline
+from app.station.contracts import Currents, EmergencyStop, InstrumentFault, InstrumentLost, Place
 from app.station.controls import Command, Controls, StopAsked
 from app.station.finishing import NotFinished
 from app.station.keeping.entries import Target
@@ -346,6 +347,33 @@ def test_a_fault_while_warming_up_is_tried_once_more_and_then_left_to_a_person(r
     assert len(failures) == 2
     room.stand.before_move = lambda place: None
     assert room.run().result is not None
+
+
+@dataclass
+class Never:
+    """What watches readings and never says that they are still."""
+
+    says: bool | None
+
+    def add(self, at_s: float, currents: Currents) -> bool | None:
+        return self.says
+
+
+@pytest.mark.parametrize(("says", "told"), [(False, "still creep"), (None, "too noisy to tell")])
+def test_a_warm_up_without_end_says_whether_it_creeps_or_nobody_can_tell(room, monkeypatch, says, told):
+    monkeypatch.setattr(Deadline, "passed", True)
+    monkeypatch.setattr(type(room.judge), "warming", lambda self: Never(says))
+    with pytest.raises(NotFinished, match=told):
+        room.run()
+
+
+@pytest.mark.parametrize(("says", "code"), [(False, "not-settled"), (None, "rest-unknown")])
+def test_currents_that_do_not_settle_are_told_from_those_nobody_can_tell_of(room, monkeypatch, says, code):
+    monkeypatch.setattr(Deadline, "passed", True)
+    monkeypatch.setattr(type(room.judge), "settling", lambda self: Never(says))
+    with pytest.raises(NotFinished):
+        room.run()
+    assert {event.said.code for event in history_in(room.folder).events} == {code}
 
 
 def test_a_new_run_does_not_wait_for_an_instrument_that_is_not_there(room, monkeypatch):
