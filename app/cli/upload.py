@@ -1,8 +1,8 @@
 """What the stand's computer runs: bring a session to the server, as often as it takes."""
 
 import hashlib
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -54,6 +54,9 @@ def upload(
             for part in track(parts, description=f"session {number}", transient=True):
                 send(client, "PUT", part.path, params=part.params, json=part.json, content=part.content)
             typer.echo(f"{item.name}: session {number}, {len(parts)} positions")
+            opened = send(client, "GET", f"/sessions/{number}").json()
+            for text in (*(warning.text for warning in session.warnings), *_differences(session, opened)):
+                typer.echo(f"warning: {text}", err=True)
             if method:
                 _solve(client, number, method)
 
@@ -120,6 +123,28 @@ def _means_body(row: MeansRow) -> dict[str, Any]:
         "started_at": None if row.started_at is None else row.started_at.isoformat(),
     }  # fmt: skip
     return {name: value for name, value in body.items() if value is not None}
+
+
+def _differences(session: SessionFiles, opened: Mapping[str, Any]) -> Iterator[str]:
+    """Where the laboratory's book, which counts, says something else than the files."""
+    facts, certificate = session.facts, opened["certificate"]
+    if facts.latitude_deg is not None and facts.latitude_deg != opened["latitude_deg"]:
+        yield (
+            f"The files give the latitude {facts.latitude_deg:g}°; that of stand {opened['stand']}, "
+            f"{opened['latitude_deg']:g}°, is used."
+        )
+    ours = {_angles(item["certified"]) for item in opened["positions"]}
+    if session.certificate and {_angles(asdict(row)) for row in session.certificate} != ours:
+        yield (
+            f"The certificate among the files is not certificate {certificate} of stand {opened['stand']}, "
+            "which is used."
+        )
+
+
+def _angles(row: Mapping[str, Any]) -> tuple[float, ...]:
+    """A certified position with what was certified of it."""
+    names = ("theta_deg", "psi_deg", "alpha_arcsec", "beta_arcsec", "gamma_arcsec")
+    return tuple(float(row[name]) for name in names)
 
 
 def _solve(client: httpx.Client, number: int, method: Method) -> None:

@@ -26,6 +26,9 @@ _STUCK_S: Final = 1.0  # unchanged for so long while the rest of the record vari
 _LEVELS: Final = 5  # a channel with fewer values is coarse, and rests on its extremes honestly
 _SATURATED_RUN: Final = 20
 _SATURATED_SHARE: Final = 0.01
+_NORMAL: Final = 1.4826  # standard deviation of normal noise over its median absolute deviation
+_LEAP: Final = 15.0  # standard deviations: no noise goes so far
+_FEWEST_FOR_LEAPS: Final = 20
 
 
 def duration_and_rate(t_s: Array) -> tuple[float, float]:
@@ -70,7 +73,8 @@ def warnings(record: CurrentRecord, lines: Sequence[int], filename: str) -> list
     found = _gaps(record.t_s, lines, place)
     _, rate = duration_and_rate(record.t_s)
     for name, values in (("jx", record.jx_ma), ("jy", record.jy_ma)):
-        found += _resting(values, rate, lines, {**place, "channel": name})
+        at = {**place, "channel": name}
+        found += _resting(values, rate, lines, at) or _leaping(values, lines, at)
     return found + _below_method(record.t_s, place)
 
 
@@ -128,6 +132,26 @@ def _resting(values: Array, rate: float, lines: Sequence[int], place: dict[str, 
             "%(file)s, θ %(theta)g°, ψ %(psi)g°: %(channel)s does not change for %(length)d rows from row "
             "%(row)d. Check the channel and measure again.",
             {**place, "length": int(lengths[longest]), "row": lines[int(starts[longest])]},
+        )
+    ]
+
+
+def _leaping(values: Array, lines: Sequence[int], place: dict[str, object]) -> list[Message]:
+    """Single values far from both neighbours, by the usual distance from them (median absolute deviation)."""
+    if len(values) < _FEWEST_FOR_LEAPS:
+        return []
+    apart = np.abs(values[1:-1] - (values[:-2] + values[2:]) / 2.0)
+    step = float(np.min(apart, initial=np.inf, where=apart > 0.0))  # of a coarse ammeter: most values may be equal
+    off = np.flatnonzero(apart > _LEAP * max(_NORMAL * float(np.median(apart)), step))
+    if not len(off):
+        return []
+    worst = int(off[np.argmax(apart[off])]) + 1
+    return [
+        Message(
+            "spike",
+            "%(file)s, θ %(theta)g°, ψ %(psi)g°: %(channel)s leaps, most of all in row %(row)d to %(value).6g mA "
+            "(usual is %(usual).6g mA), which moves the mean. Measure again; look for switching nearby and loose plugs.",
+            {**place, "row": lines[worst], "value": float(values[worst]), "usual": float(np.median(values))},
         )
     ]
 

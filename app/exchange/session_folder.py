@@ -133,8 +133,9 @@ class _Gathering:
             return None
         try:
             known = read_parameters(self._files[TRUTH], TRUTH)
-        except Invalid as error:
-            self.problems += error.problems
+        except Invalid as error:  # nothing is computed from it: the session is as good without
+            why = {"file": TRUTH, "why": error.problems[0].text}
+            self.warnings.append(Message("truth-unreadable", "%(file)s is not used: %(why)s", why))
             return None
         return {parameter: item.value for parameter, item in known.items()}
 

@@ -107,6 +107,21 @@ def test_coarse_but_honest_quantisation_is_no_fault(quantum_ma: float) -> None:
         assert codes(record(jx_ma=coarse)) == []
 
 
+@pytest.mark.parametrize("quantum_ma", [0.0, 1e-5, 2e-5])
+def test_a_value_that_leaps_is_named_with_its_row(quantum_ma: float) -> None:
+    jx = noisy()
+    if quantum_ma:
+        jx = np.round(jx / quantum_ma) * quantum_ma
+    jx[7000] = 4.0
+    _, (warning,) = read_record(write_record_csv(record(jx_ma=jx)), "theta090_psi270.csv")
+    assert (warning.code, warning.values["channel"], warning.values["row"]) == ("spike", "jx", 7002)
+
+
+def test_what_drifts_and_waves_does_not_leap() -> None:
+    wave = 0.01 * np.sin(np.arange(N) / 300) + np.linspace(0.0, 0.05, N)
+    assert codes(record(jx_ma=wave + noisy())) == []
+
+
 def test_one_long_file_is_cut_into_its_measurements() -> None:
     theta, psi = [0, 0, 0, 0, 90, 90, 0, 0], [0, 0, 90, 90, 0, 0, 0, 0]
     rows = "".join(f"{t},{p},{i},{i}.5,{-i}\n" for i, (t, p) in enumerate(zip(theta, psi, strict=True)))
