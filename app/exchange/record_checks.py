@@ -141,7 +141,9 @@ def _leaping(values: Array, lines: Sequence[int], place: dict[str, object]) -> l
     if len(values) < _FEWEST_FOR_LEAPS:
         return []
     apart = np.abs(values[1:-1] - (values[:-2] + values[2:]) / 2.0)
-    step = float(np.min(apart, initial=np.inf, where=apart > 0.0))  # of a coarse ammeter: most values may be equal
+    step = float(
+        np.min(apart, initial=np.inf, where=apart > 0.0)
+    )  # of a coarse ammeter: most values may be equal
     off = np.flatnonzero(apart > _LEAP * max(_NORMAL * float(np.median(apart)), step))
     if not len(off):
         return []
@@ -150,7 +152,8 @@ def _leaping(values: Array, lines: Sequence[int], place: dict[str, object]) -> l
         Message(
             "spike",
             "%(file)s, θ %(theta)g°, ψ %(psi)g°: %(channel)s leaps, most of all in row %(row)d to %(value).6g mA "
-            "(usual is %(usual).6g mA), which moves the mean. Measure again; look for switching nearby and loose plugs.",
+            "(usual is %(usual).6g mA), which moves the mean. Measure again; look for switching nearby and loose "
+            "plugs.",
             {**place, "row": lines[worst], "value": float(values[worst]), "usual": float(np.median(values))},
         )
     ]
