@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from app.errors import Invalid, Problem
 from app.station.contracts import Certified, Place
 from app.station.keeping import durable
 from app.station.keeping.entries import Opened, Planned
@@ -49,11 +50,12 @@ class Memory:
 
 @dataclass(slots=True)
 class Preparing:
-    """Makes the plan of a new run."""
+    """Makes the plan of a new run; `reach` refuses a place that the stand cannot go to."""
 
     spool: Spool
     service: Callable[[], Service]
     memory: Memory
+    reach: Callable[[Place], None]
     asked: tuple[Place, ...] = ()
     gyro_type: str | None = None
 
@@ -72,8 +74,20 @@ class Preparing:
             "sixteen": SIXTEEN,
         }
         source, places = next((source, places) for source, places in choices.items() if places)
+        self._require_reachable(places)
         turned = max((item.turned_arcsec for item in certified or remembered), default=None)
         self.spool.add(Planned(places, source, self.gyro_type or gyro_type, turned))
+
+    def _require_reachable(self, places: tuple[Place, ...]) -> None:
+        """Find out before anything moves what the stand cannot do; raises `Invalid` with all of it."""
+        beyond: dict[str, Problem] = {}
+        for place in places:
+            try:
+                self.reach(place)
+            except Invalid as error:
+                beyond |= {item.text: item for item in error.problems}
+        if beyond:
+            raise Invalid(*beyond.values())
 
     def _certified(self) -> tuple[tuple[Certified, ...], str | None]:
         """Positions of the session's certificate and the gyro's type; nothing when the service is away."""
@@ -92,9 +106,10 @@ class Preparing:
             if not self.spool.history.session:
                 raise
             self.spool.note("warning", refused.problems[0].message)
-        self.spool.note(
-            "warning",
-            Message("certificate-unheard", "The certificate could not be asked for its positions; they are taken "
-                    "as remembered, or as the method's sixteen."),
-        )  # fmt: skip
+        if not self.asked:
+            self.spool.note(
+                "warning",
+                Message("certificate-unheard", "The certificate could not be asked for its positions; they are taken "
+                        "as remembered, or as the method's sixteen."),
+            )  # fmt: skip
         return (), None

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 from app.station.clock import Clock
@@ -15,7 +16,7 @@ from app.station.finishing import Finishing
 from app.station.instruments.ammeter import DescribedAmmeter
 from app.station.instruments.description import StationFile
 from app.station.instruments.opening import open_ammeter, open_stand
-from app.station.instruments.stand import DescribedStand
+from app.station.instruments.stand import DescribedStand, check_travel
 from app.station.judging import Rules
 from app.station.keeping import runs
 from app.station.keeping.entries import Begun, Entry, Resumed
@@ -98,6 +99,7 @@ def live_through(
                 spool,
                 orders.service,
                 Memory(runs.home() / "certificates.json"),
+                partial(check_travel, described.stand),
                 orders.places,
                 orders.gyro_type,
             )

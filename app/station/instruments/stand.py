@@ -157,8 +157,8 @@ def _within(angle: float, travel: Travel, axis: str) -> float:
     raise Invalid(
         problem(
             "beyond-travel",
-            "The stand cannot go to %(axis)s = %(angle)g°: it travels from %(smallest)g° to %(largest)g°. Leave "
-            "the position out, or correct the limits in the station's file.",
+            "The stand cannot go to %(axis)s = %(angle)g°: it travels from %(smallest)g° to %(largest)g°. Give "
+            "--positions without it, or correct the limits in the station's file.",
             axis=axis,
             angle=angle,
             smallest=travel.smallest_deg,

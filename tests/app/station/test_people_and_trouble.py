@@ -401,6 +401,25 @@ def test_with_the_service_away_it_measures_and_sends_when_it_is_back(room):
     }
 
 
+def test_positions_that_were_asked_for_need_no_certificate(room):
+    room.service.trouble = [away()] * 3
+    room.asked = PLACES[:2]
+    history = room.run()
+    assert history.places == PLACES[:2]
+    assert "certificate-unheard" not in {event.said.code for event in history.events}
+
+
+def test_places_beyond_the_travel_are_all_named_before_anything_moves_and_can_be_left_out(room):
+    room.stand.beyond = PLACES[1:]
+    with pytest.raises(Invalid, match=r"0/180\.\nNot to 90/0"):
+        room.run()
+    assert not room.stand.homed
+    assert room.stand.moves == []
+    assert [event.said.code for event in history_in(room.folder).events] == ["beyond-travel"] * 2
+    room.asked = PLACES[:1]
+    assert room.run().result is not None
+
+
 def test_the_certificates_positions_are_remembered(room):
     room.run()
     (room.folder / "memory.json").rename(room.folder.parent / "memory.json")

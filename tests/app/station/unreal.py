@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from app.errors import Invalid, problem
 from app.exchange.rows import CurrentRecord
 from app.station.clock import Clock
 from app.station.contracts import Acquisition, Block, Certified, Currents, Place, StandStatus
@@ -40,6 +41,11 @@ class UnrealStand:
     moves: list[Place] = field(default_factory=list)
     before_move: Callable[[Place], None] = lambda place: None
     stops: int = 0
+    beyond: tuple[Place, ...] = ()
+
+    def reach(self, place: Place) -> None:
+        if place in self.beyond:
+            raise Invalid(problem("beyond-travel", f"Not to {place.theta_deg:g}/{place.psi_deg:g}."))
 
     def identify(self) -> str:
         return "stand"
@@ -116,6 +122,7 @@ class Opinionated:
 
     objections: dict[tuple[Target, int], Finding] = field(default_factory=dict)
     odd_until: dict[tuple[Place, Place], int] = field(default_factory=dict)
+    alone: tuple[Place, ...] = ()
 
     def settling(self) -> AtOnce:
         return AtOnce()
@@ -138,6 +145,9 @@ class Opinionated:
             for pair, takes in self.odd_until.items()
             if set(pair) <= set(means) and min(len(history.takes(Target(*place))) for place in pair) < takes
         ]
+
+    def unseen(self, means: Mapping[Place, Currents]) -> tuple[Place, ...]:
+        return self.alone
 
 
 def objection(code: str) -> Finding:
@@ -204,6 +214,7 @@ class Room:
     service: UnrealService = field(default_factory=UnrealService)
     controls: Controls = field(default_factory=Controls)
     options: dict[str, object] = field(default_factory=dict)
+    asked: tuple[Place, ...] = ()
 
     def __post_init__(self) -> None:
         self.ammeter = UnrealAmmeter(self.stand)
@@ -219,7 +230,9 @@ class Room:
                 spool, self.stand, self.ammeter, self.judge, Clock(speed=1e6, poll_s=0.0), self.controls,
                 helpers=[forwarder], block_samples=BLOCK,
             )  # fmt: skip
-            preparing = Preparing(spool, self.service.connect, Memory(self.folder / "memory.json"))
+            preparing = Preparing(
+                spool, self.service.connect, Memory(self.folder / "memory.json"), self.stand.reach, self.asked
+            )
             leave_out = bool(self.options.get("leave_out"))
             finishing = Finishing(at, forwarder, self.service.connect, "least-squares", leave_out)
             attended = bool(self.options.get("attended"))
