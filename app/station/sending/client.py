@@ -5,7 +5,7 @@ from typing import Any, Final
 
 import httpx
 
-from app.errors import AppError, Problem, problem
+from app.errors import AppError, Invalid, Problem, problem
 from app.exchange.record_places import record_name
 
 API: Final = "/api/v1"
@@ -28,7 +28,14 @@ class Unreachable(AppError):
 
 
 def connected(server: str, token: str, timeout_s: float = 60.0) -> httpx.Client:
-    """A client of the service at that address; to be closed."""
+    """A client of the service at that address; to be closed.
+
+    Raises
+    ------
+    Invalid
+        That is no address: waiting would not help.
+    """
+    _require_address(server)
     headers = {"Authorization": f"Bearer {token}"}
     return httpx.Client(base_url=server.rstrip("/") + API, timeout=timeout_s, headers=headers)
 
@@ -46,8 +53,6 @@ def send_once(client: httpx.Client, verb: str, path: str, **what: Any) -> httpx.
     said = {name: value for name, value in what.items() if value is not None}
     try:
         answer = client.request(verb, path, **said)
-    except httpx.InvalidURL as error:
-        raise _away(client, str(error)) from error
     except httpx.TransportError as error:
         raise _away(client, str(error) or type(error).__name__) from error
     if answer.status_code >= 500 or answer.status_code in _LATER:
@@ -118,6 +123,22 @@ def result_of(job: dict[str, Any]) -> str:
             problem("not-solved", "The calibration gave no result: %(detail)s", detail=detail)
         )
     return str(job["result"])
+
+
+def _require_address(server: str) -> None:
+    try:
+        address = httpx.URL(server)
+    except httpx.InvalidURL:
+        address = httpx.URL()
+    if address.scheme not in ("http", "https") or not address.host:
+        raise Invalid(
+            problem(
+                "not-an-address",
+                "“%(server)s” is not the address of a service. It looks like https://driftbook.example.",
+                column="--server",
+                server=server,
+            )
+        )
 
 
 def _away(client: httpx.Client, reason: str) -> Unreachable:

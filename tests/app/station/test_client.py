@@ -3,8 +3,9 @@
 import httpx
 import pytest
 
+from app.errors import Invalid
 from app.station.sending import client
-from app.station.sending.client import ServerRefused, Unreachable, asked, followed, send, send_once
+from app.station.sending.client import ServerRefused, Unreachable, asked, connected, followed, send, send_once
 
 PROXY = httpx.Response(200, html="<p>Please sign in to the network.</p>")
 
@@ -20,6 +21,14 @@ def answering(*answers: httpx.Response | Exception) -> httpx.Client:
         return answer
 
     return httpx.Client(base_url="http://lab.example/api/v1", transport=httpx.MockTransport(handle))
+
+
+@pytest.mark.parametrize(
+    "server", ["not a url", "lab.example:8000", "http://", "ftp://lab.example", "http://lab.example:port"]
+)
+def test_what_is_no_address_is_not_waited_for(server):
+    with pytest.raises(Invalid, match=r"--server: .* is not the address of a service"):
+        connected(server, "token")
 
 
 @pytest.fixture
