@@ -72,7 +72,15 @@ def about_fit(estimate: Estimate, observations: Observations) -> list[Message]:
                 "scatter of the residuals, and the fit cannot be tested.",
             )
         )
-    if untold and estimate.uncertainty_basis == "none":
+    if untold and estimate.uncertainty_basis == "none" and estimate.fit.dof > 0:
+        warnings.append(
+            Message(
+                "no-uncertainty",
+                "No uncertainty of the currents is given, and the residuals do not tell it where the scale factors "
+                "are not determined: the parameters have no uncertainty. Measure positions with other θ and ψ.",
+            )
+        )
+    elif untold and estimate.uncertainty_basis == "none":
         warnings.append(
             Message(
                 "no-uncertainty",

@@ -17,7 +17,9 @@ WITHIN_NOISE: Final = 6.0
 """Largest difference of readings that may be one value, in units of their u: P ≈ 2e-5 for two, and a
 longer run is judged by its scatter besides."""
 _LEAST_RUN: Final = 2
-_RELATIVE: Final = 1e-4
+_RELATIVE: Final = (1e-4, 3e-4, 1e-3, 3e-3)
+"""Half the largest difference of readings that may be one value without u(J), parts of the largest current of both
+channels (a stuck one may show next to nothing): of the Earth rate 0.003 to 0.1 °/h."""
 _HALF_CLIPPED: Final = 0.1
 _DIFFERENT: Final = 0.1
 _SURE_RUN: Final = 3
@@ -28,11 +30,12 @@ def stuck_channels(observations: Observations) -> Iterator[Hypothesis]:
     """Channels whose last readings, in measuring order, repeat one value."""
     order = measuring_order(observations)
     for channel, name in enumerate("xy"):
-        currents, tolerance = _channel(observations, channel)
-        for exact in (True, False):
-            start = _run(currents[order], None if exact else tolerance[order])
+        currents, tolerances = _channel(observations, channel)
+        starts = [_run(currents[order], None)]
+        starts += [_run(currents[order], tolerance[order]) for tolerance in tolerances]
+        for start in dict.fromkeys(starts):
             run = order[start:]
-            if len(run) < _LEAST_RUN or (not exact and np.ptp(currents[run]) == 0):
+            if len(run) < _LEAST_RUN:
                 continue
             for first in (1, 0):  # frozen at its first, good reading; or at a value of no meaning
                 missing = np.zeros((len(order), 2), dtype=np.bool_)
@@ -54,26 +57,27 @@ def surely_stuck(observations: Observations, x: Array, *, visible: bool) -> str:
     order = measuring_order(observations)
     found = ""
     for channel, name in enumerate("xy"):
-        currents, tolerance = _channel(observations, channel)
+        currents, tolerances = _channel(observations, channel)
         other, quiet = _channel(observations, 1 - channel)
         exact = order[_run(currents[order], None) :]
-        near = order[_run(currents[order], tolerance[order]) :]
-        early = len(near) >= max(_SURE_RUN, len(order) - REGRESSORS) and not visible
-        alive = np.ptp(other[near]) > _ALIVE * quiet.max()  # so the noise is not larger than all currents
-        for run, sure in ((exact, len(exact) >= _SURE_RUN), (near, early and alive)):
-            if sure and np.ptp(x[run], axis=0).max() > _DIFFERENT:
-                found += name
-                break
+        runs = [(exact, len(exact) >= _SURE_RUN)]
+        for tolerance, least in zip(tolerances, quiet, strict=True):
+            near = order[_run(currents[order], tolerance[order]) :]
+            early = len(near) >= max(_SURE_RUN, len(order) - REGRESSORS) and not visible
+            alive = np.ptp(other[near]) > _ALIVE * least.max()  # so the noise is not larger than all currents
+            runs.append((near, early and alive))
+        if any(sure and np.ptp(x[run], axis=0).max() > _DIFFERENT for run, sure in runs):
+            found += name
     return found
 
 
 def saturated_channels(observations: Observations) -> Iterator[Hypothesis]:
     """Channels whose largest readings, of either or of both signs, agree."""
     for channel, name in enumerate("xy"):
-        currents, tolerance = _channel(observations, channel)
+        currents, tolerances = _channel(observations, channel)
         tried: set[tuple[int, ...]] = set()
         for height in (np.abs(currents), currents, -currents):
-            for rows, level in _tops(height, tolerance):
+            for rows, level in _tops(height, tolerances[0]):
                 if len(rows) < _LEAST_RUN or rows in tried:
                     continue
                 tried.add(rows)
@@ -102,13 +106,17 @@ def _tops(height: Array, tolerance: Array) -> Iterator[tuple[tuple[int, ...], in
             yield tuple(sorted(int(row) for row in order[: count + 1])), count
 
 
-def _channel(observations: Observations, channel: int) -> tuple[Array, Array]:
-    """Currents of a channel and how far each may be from a value that it repeats."""
+def _channel(observations: Observations, channel: int) -> tuple[Array, list[Array]]:
+    """Currents of a channel and how far each may be from a value that it repeats.
+
+    Without u(J) several answers, narrow to wide: which noise the sound readings have is for the fit to say.
+    """
     currents = (observations.jx, observations.jy)[channel]
     u = (observations.u_jx, observations.u_jy)[channel]
     if u is None:
-        return currents, np.full(len(currents), _RELATIVE * float(np.abs(currents).max()))
-    return currents, np.asarray(WITHIN_NOISE / 2 * u)
+        largest = max(float(np.abs(observations.jx).max()), float(np.abs(observations.jy).max()))
+        return currents, [np.full(len(currents), relative * largest) for relative in _RELATIVE]
+    return currents, [np.asarray(WITHIN_NOISE / 2 * u)]
 
 
 def _run(currents: Array, tolerance: Array | None) -> int:

@@ -40,6 +40,7 @@ from solver.blunders.verdicts import (
     or_changed,
     place,
     places,
+    scattered,
     separate,
     small_angles,
     twins_alike,
@@ -56,6 +57,9 @@ EQUIVALENT: Final = 9.2
 _LEAST_POSITIONS: Final = 2
 _OVERSTATED: Final = 1e-3
 """χ² over its freedom below which the stated noise is of no use: u(J) in another unit than J, perhaps."""
+_ABSURD: Final = 0.01
+"""Scatter without u(J), relative to the Earth rate, that is no gyro's noise: 0.15 °/h, by which a K is uncertain by
+about 1 % of itself."""
 _MOST_EQUIVALENT: Final = 6
 _APART: Final = 3.0
 _CONCEIVABLE: Final = 5.0
@@ -126,12 +130,7 @@ def diagnose(
         explanations += visible(session, suspicion)
     explanations = _distinct(explanations)
     findings = _findings(session, explanations)
-    if not findings and session.improbable(session.good, UNEXPLAINED_LEVEL):
-        chi2 = session.reported()
-        message = unexplained("χ²", chi2, session.good.best.dof)
-        findings = (Finding(message.code, message, (), chi2, None),)
-    elif not findings:
-        findings = _changed(session)
+    findings = findings or _unexplained(session) or _changed(session)
     return Diagnosis(findings, _not_excluded(session, explanations))
 
 
@@ -157,9 +156,30 @@ def _findings(session: Session, explanations: list[Explanation]) -> tuple[Findin
     ][:_MOST_EQUIVALENT]
     members = [best, *alike]
     more = session.reported() - session.good.best.squares if session.told and not session.by_currents else 0.0
-    return tuple(
+    found = tuple(
         _finding(session, item, [other for other in members if other is not item], more) for item in members
     )
+    return found + (() if best.scatter is None else _scattered(best.scatter))
+
+
+def _unexplained(session: Session) -> tuple[Finding, ...]:
+    """A misfit far beyond the stated noise, or without u(J) beyond that of any gyro that the method is for."""
+    best = session.good.best
+    if session.improbable(session.good, UNEXPLAINED_LEVEL):
+        chi2 = session.reported()
+        message = unexplained("χ²", chi2, best.dof)
+        return (Finding(message.code, message, (), chi2, None),)
+    if session.told or best.dof < 1:
+        return ()
+    return _scattered(session.good.scatter)
+
+
+def _scattered(scatter: float) -> tuple[Finding, ...]:
+    """That what scatters so much, relative to what is measured, is not noise."""
+    if scatter < _ABSURD:
+        return ()
+    message = scattered(scatter)
+    return (Finding(message.code, message, (), None, None),)
 
 
 def _changed(session: Session) -> tuple[Finding, ...]:

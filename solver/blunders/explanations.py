@@ -72,6 +72,8 @@ class Explanation:
         Parameters with the data put right.
     distance
         D² from the prior with the data put right; None without prior or fit.
+    scatter
+        Without u(J), what the residuals still scatter by, relative to what is measured.
     """
 
     code: str
@@ -86,6 +88,7 @@ class Explanation:
     values: Array | None = None
     u: Array | None = None
     distance: float | None = None
+    scatter: float | None = None
 
     @property
     def claim(self) -> tuple[Any, ...]:
@@ -134,7 +137,7 @@ def _explained(session: Session, score: Score, certain: str = "") -> Explanation
         hypothesis.code, hypothesis.rows, details, session.total(score) - (_CERTAIN if sure else 0.0),
         session.gain(score) + nearer, sure or session.significant(score), *squares,
         (measure, *squares) if session.told else _scatters(before, after, by_currents=after is score.currents),
-        *_parameters(session, score), score.distance,
+        *_parameters(session, score), score.distance, None if session.told else score.scatter,
     )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from solver.blunders.current_model import CurrentModel, Solutions, regressors
 from solver.blunders.hypotheses import Hypothesis
 from solver.blunders.hypothesis_fit import UNTOLD, Data, Fitted, fit, other_inputs, rough
 from solver.blunders.prior import Prior
+from solver.constants import EARTH_RATE
 from solver.current_noise import current_noise
 from solver.error_model import observation_equations
 from solver.estimators.estimation import least_squares
@@ -80,6 +81,11 @@ class Score:
     def best(self) -> Sum:
         """The eight parameters' where there is one."""
         return self.rates or self.currents
+
+    @property
+    def scatter(self) -> float:
+        """Without u(J): the residuals' standard deviation, of the rates relative to the Earth's, or of the currents."""
+        return float(np.sqrt(self.best.variance)) * (1.0 if self.rates is None else UNTOLD / EARTH_RATE)
 
 
 @dataclass(slots=True)
@@ -221,10 +227,14 @@ class Session:
         return good.squares - other.squares if self.told else self._ratio(good, other)
 
     def _ratio(self, good: Sum, other: Sum) -> float:
-        floor = _ROUNDING**2 * float(np.sum(self.model.weights * self.model.currents**2))
         if good.dof < 1:
             return 0.0
-        return good.dof * float(np.log((good.variance + floor) / (other.variance + floor)))
+        return good.dof * float(np.log((good.variance + self._rounding) / (other.variance + self._rounding)))
+
+    @property
+    def _rounding(self) -> float:
+        """Mean square that says nothing: rounding of the currents."""
+        return _ROUNDING**2 * float(np.sum(self.model.weights * self.model.currents**2))
 
     def nearer(self, score: Score) -> float:
         """By how much D² falls, as it counts (`Prior.cost`)."""
@@ -272,6 +282,8 @@ class Session:
         """Whether good data would hardly ever look as much better under this hypothesis."""
         hypothesis = score.hypothesis
         if hypothesis is None or self.comparable(score)[1].dof < (0 if self.told else _LEAST_FREEDOM):
+            return False
+        if not self.told and self.comparable(score)[0].variance <= self._rounding:
             return False
         gain, doubtful = self.gain(score), not self.told or self.improbable(score, DOUBT)
         if hypothesis.repeated is not None:

@@ -216,6 +216,17 @@ def unexplained(measure: str, value: float, expected: int) -> Message:
     )
 
 
+def scattered(scatter: float) -> Message:
+    """Residuals without stated noise that no gyro's noise could be, relative to what is measured."""
+    return Message(
+        "unexplained",
+        "The residuals scatter by %(percent)s %% of the Earth rate, far more than a gyro's noise, and no single "
+        "mistake explains it: the parameters cannot be relied upon. Look for several mistakes among the positions, the "
+        "certificate and the currents.",
+        {"percent": number(100.0 * scatter)},
+    )
+
+
 def differences(of: Array, apart: Array) -> str:
     """Name the parameters by which a gyro is not the one expected, in no language.
 

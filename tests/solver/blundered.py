@@ -256,7 +256,7 @@ def current_unit(session: Session) -> Made:
 
 VISIBLE: Mapping[str, Callable[[Session], Made]] = {
     "outlier": outlier, "positions-swapped": swapped, "position-wrong": position_wrong, "angle-unit": angle_unit,
-    "channel-stuck": stuck, "channel-saturated": saturated,
+    "channel-stuck": stuck, "channel-stuck, with noise": stuck_with_noise, "channel-saturated": saturated,
     "warm-up, linear": warm_up_linear, "warm-up, exponential": warm_up_exponential,
 }  # fmt: skip
 INVISIBLE: Mapping[str, Callable[[Session], Made]] = {

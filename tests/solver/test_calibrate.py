@@ -168,6 +168,16 @@ def test_four_positions_leave_nothing_to_take_an_uncertainty_from(rng):
     assert estimate.fit.dof == 0
 
 
+def test_no_uncertainty_says_why_there_is_none(rng):
+    """At a pole residuals of 26 degrees of freedom are left, but no scale factor to tell the currents' from."""
+    few = Setup(positions=np.array([(20.0, 10.0), (60.0, 190.0), (115.0, 50.0), (230.0, 20.0)]))
+    for setup, dof, words in ((few, 0, "no residual is left"), (Setup(latitude=90.0), 26, "scale factors")):
+        estimate = calibrate(setup.observe(rng), "least-squares").least_squares
+        assert (estimate.uncertainty_basis, estimate.fit.dof) == ("none", dof)
+        told = {warning.code: warning.text for warning in estimate.warnings}
+        assert words in told["no-uncertainty"]
+
+
 def test_an_outlier_is_named_with_position_and_axis(rng):
     observations = Setup(noise=0.005, u_given=True).observe(rng)
     observations.jy[6] += 40 * observations.u_jy[6]

@@ -72,17 +72,36 @@ def test_good_data_are_left_alone(u_given, expected):
     assert alarms <= stats.binom.ppf(1 - 1e-4, 60, 0.01)
 
 
-@pytest.mark.parametrize("name", ["channel-stuck", "channel-saturated"])
-def test_noise_on_a_faulty_channel_does_not_hide_it(name, rng):
+def test_noise_on_a_saturated_channel_does_not_hide_it(rng):
     for _ in range(5):
         session = Study().draw(rng)
-        made, truth = blundered.stuck_with_noise(session) if name == "channel-stuck" else ALL[name](session)
-        if name == "channel-saturated":
-            top = np.abs(made.jx if truth.details["channel"] == "x" else made.jy)
-            channel = made.jx if truth.details["channel"] == "x" else made.jy
-            clipped = top == top.max()
-            channel[clipped] += 0.5 * session.u * rng.standard_normal(clipped.sum())
+        made, truth = VISIBLE["channel-saturated"](session)
+        channel = made.jx if truth.details["channel"] == "x" else made.jy
+        clipped = np.abs(channel) == np.abs(channel).max()
+        channel[clipped] += 0.5 * session.u * rng.standard_normal(clipped.sum())
         assert right(diagnose(made), truth)
+
+
+@pytest.mark.parametrize("row", [0, 2, 6, 10, 12, 13])
+def test_a_stuck_channel_with_noise_shows_without_a_stated_one(row, rng):
+    """From any position on: the tolerance of a repeated reading is that of the sound ones."""
+    for _ in range(5):
+        session = Study(u_given=False).draw(rng)
+        currents = session.currents()
+        currents[row:, 1] = currents[row, 1] + session.u * rng.standard_normal(16 - row)
+        assert right(diagnose(session.written(currents)), Truth("channel-stuck", (), {"channel": "y"}))
+
+
+def test_a_scatter_that_no_gyro_has_is_told_without_a_stated_one(rng):
+    """Three of sixteen positions with currents of nearly nothing; and silence at ten times the usual noise."""
+    for _ in range(10):
+        session = Study(u_given=False).draw(rng)
+        currents = session.currents()
+        currents[[2, 7, 11]] = 1e-6
+        finding = diagnose(session.written(currents)).findings[-1]  # after one mistake, if one stands out
+        assert (finding.code, finding.chi2_before) == ("unexplained", None)
+        assert float(finding.message.values["percent"]) > 1.0
+        assert not diagnose(good(Study(u_given=False, noise=0.05).draw(rng))[0]).findings
 
 
 def test_a_message_says_what_to_do(rng):
@@ -414,6 +433,14 @@ def test_exact_data_raise_no_alarm():
         u = np.full(16, 1e-12)
         made = remade(observations, u_jx=u, u_jy=u) if u_given else observations
         assert not diagnose(made).findings
+
+
+@pytest.mark.parametrize("latitude", [90.0, 55.76])
+def test_rounding_is_no_outlier(latitude, rng):
+    """Nor at a pole, where the scale factors do not show and the currents are compared."""
+    for _ in range(10):
+        study = Study(noise=0.0, u_given=False, latitude=latitude)
+        assert not diagnose(good(study.draw(rng))[0]).findings
 
 
 def test_the_gyro_far_from_its_prior_is_not_a_blunder():
