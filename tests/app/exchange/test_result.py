@@ -11,7 +11,7 @@ from app.exchange.json_values import dumps, message_from, message_json
 from app.exchange.result import calibration_json
 from app.exchange.rows import CertificateRow, MeansRow
 from app.exchange.si import observations
-from solver.calibrate import Calibration
+from solver.calibrate import Calibration, calibrate
 from solver.errors import Message
 from solver.records import PARAMETERS, Estimate, Failure, Fit, Method, Observations
 
@@ -195,3 +195,39 @@ def test_json_never_holds_nan_and_equal_content_gives_equal_bytes() -> None:
     first, second = (dumps(calibration_json(_calibration(), "both")) for _ in range(2))
     assert first == second
     assert "rad/(s·A)" in first
+
+
+def test_a_moderated_uncertainty_is_told_as_stated_and_as_used():
+    """Estimates that differ no more than their ν explains: the mean square of each channel, ν of all together."""
+    u_ma = np.array([1.0, 1.1, 0.9, 1.0, 1.2, 0.8, 1.05, 0.95]) * 2e-6
+    places = [(theta, psi) for theta in (0.0, 90.0) for psi in (0.0, 90.0, 180.0, 270.0)]
+    certificate = [CertificateRow(theta, psi, 1.0, 2.0, 3.0) for theta, psi in places]
+    drifts = np.array(
+        [[1.5, -0.8]]
+    )  # of a gyro with K = 2000 °/h/mA and ωg = 6 °/h/g, but for the Earth rate
+    theta, psi = np.radians(places).T
+    currents = (drifts + 6.0 * np.sin(theta)[:, None] * np.column_stack((np.sin(psi), np.cos(psi)))) / 2000.0
+    north = 15.0 * np.cos(np.radians(55.0)) * np.column_stack((np.sin(psi), np.cos(psi)))
+    currents -= north * np.cos(theta)[:, None] / 2000.0
+
+    def result(dof: float | None) -> dict:
+        means = [
+            MeansRow(*place, *pair, u_jx_ma=u, u_jy_ma=2 * u, dof_jx=dof, dof_jy=dof)
+            for place, pair, u in zip(places, currents.tolist(), u_ma.tolist(), strict=True)
+        ]
+        calibration = calibrate(observations(means, certificate, 55.0), "least-squares")
+        return json.loads(dumps(calibration_json(calibration, "least-squares")))
+
+    noise = result(10.0)["current_noise"]
+    np.testing.assert_allclose(noise["x"]["u_ma"], u_ma, rtol=ONE_ROUNDING)
+    assert noise["y"]["dof"] == [10.0] * 8
+    np.testing.assert_allclose(noise["x"]["u_used_ma"], np.sqrt(np.mean(u_ma**2)), rtol=1e-12)
+    np.testing.assert_allclose(noise["y"]["u_used_ma"], 2 * np.sqrt(np.mean(u_ma**2)), rtol=1e-12)
+    np.testing.assert_allclose(noise["x"]["dof_used"], 80.0, rtol=1e-12)
+    # what estimated weights add: 4·(1 − leverage)/ν, leverages of 16 currents summing to 8
+    added = [(np.array(noise[axis]["u_counted_ma"]) / noise[axis]["u_used_ma"]) ** 2 - 1 for axis in "xy"]
+    assert np.sum(added) == pytest.approx(
+        4 * (16 - 8) / 80.0, rel=0.01
+    )  # K moves a little between the rounds of weighting
+    assert "used 2.01e-06 mA with ν 80" in noise["conclusion"]["message"]
+    assert "current_noise" not in result(None)
