@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
+from typing import Final
 
+from app.errors import Invalid, problem
 from app.station.clock import Clock
 from app.station.contracts import Place
 from app.station.controls import Controls
@@ -28,6 +30,9 @@ from app.station.sending.live import Live
 from app.station.sending.reporting import PATIENCE_S, Reporter
 from app.station.sending.service import Service
 from app.station.workplace import Patience, Workplace
+
+
+_SIMULATED: Final = "Driftbook,SIM-"
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,11 +87,15 @@ def live_through(
 
     Raises
     ------
+    Invalid
+        The service's address is none, or real instruments are to be hurried; nothing was begun.
     AppError
         It cannot be begun or gone on with now; the folder keeps what there is.
     StopAsked
         Somebody ended it; likewise.
     """
+    _require_real_time(described, clock)
+    orders.service().close()  # refuses what is no address
     with Spool(folder, told) as spool:
         _begin(spool, orders, described)
         live = Live()
@@ -106,6 +115,21 @@ def live_through(
             finishing = Finishing(at, forwarder, orders.service, orders.method, orders.leave_out)
             Cycle(at, preparing, finishing, orders.attended, orders.release).run()
         return spool.history
+
+
+def _require_real_time(described: StationFile, clock: Clock) -> None:
+    """Only what is simulated can be hurried: a gyro would be taken for warm, and for settled, long before it is."""
+    identities = (described.stand.identity.pattern, described.ammeter.identity.pattern)
+    if clock.speed != 1.0 and not all(pattern.startswith(_SIMULATED) for pattern in identities):
+        raise Invalid(
+            problem(
+                "real-time",
+                "Real instruments take their time. Leave it out; it is for simulated ones, whose identity in the "
+                "station's file begins with %(begin)s.",
+                column="--speed",
+                begin=_SIMULATED,
+            )
+        )
 
 
 def _begin(spool: Spool, orders: Orders, described: StationFile) -> None:

@@ -164,6 +164,28 @@ def measured(run: Run) -> dict[tuple[float, float, int], dict]:
     return {(row["theta_deg"], row["psi_deg"], row["repeat"]): row["measurement"] for row in rows}
 
 
+@pytest.mark.parametrize(
+    ("changed", "options", "said"),
+    [
+        ("Driftbook,SIM-STAND", ("--speed", 1000), "--speed: Real instruments take their time."),
+        ("Driftbook,SIM-AMMETER", ("--speed", 0.5), "--speed: Real instruments take their time."),
+        (None, ("--server", "not a url"), "--server: “not a url” is not the address of a service."),
+    ],
+    ids=["real stand", "real ammeter", "no address"],
+)
+def test_what_cannot_go_well_is_refused_before_anything_is_begun(driftbook, tmp_path, changed, options, said):
+    config = tmp_path / "station.toml"
+    config.write_text(SIMULATED.read_text("utf-8").replace(changed or "\0", "ACME,RT-2"), "utf-8")
+    spool = tmp_path / "spool"
+    outcome = driftbook(
+        "station", "run", "--config", config, "--gyro", "0417", "--stand", "S1", "--token", "t",
+        "--server", "http://127.0.0.1:9", "--spool", spool, *options,
+    )  # fmt: skip
+    assert outcome.code == 2
+    assert said in outcome.err
+    assert not spool.exists()
+
+
 def test_a_cycle_from_identity_to_the_calibrations_page(laboratory, cycle):
     bench = bench_of("gvk-6")
     stand = laboratory.stand_of(bench)
@@ -286,6 +308,17 @@ def test_parameters_that_were_not_found_are_no_success(laboratory, cycle):
     assert run.code == 1
     assert unknown
     assert f"Not determined from these positions: {', '.join(unknown)}." in run.err
+
+
+def test_a_wrong_position_that_has_no_partners_to_show_it_is_no_success(laboratory, cycle):
+    """Four positions: the fit takes the mistake for another scale factor, of half the true one."""
+    bench = bench_of("gvk-6")
+    stand = laboratory.stand_of(bench)
+    with instruments(bench, faults=["wrong-position@0/180!"]) as served:
+        run = cycle(served, stand, "--positions", "0/0,0/90,0/180,90/0")
+    assert run.code == 1
+    assert run.result["parameters"]["kx"]["value"] < 0.6 * truth_values(bench.gyro)["kx"]
+    assert "another position: 0/0, 0/90, 0/180, 90/0." in run.err
 
 
 def test_a_stand_whose_certificate_states_degrees_is_no_stand_that_stands_wrong(laboratory, cycle):
