@@ -45,13 +45,18 @@ _REPLACED: Final[Columns[Replaced]] = {
 }
 
 
+MAIN: Final = (
+    "Without it the first one that the gyro has results of: least-squares, generalised, robust, paper."
+)
+
+
 class Wanted(Incoming):
     """Which part of a drift; a day as the end counts to its end, UTC."""
 
     parameter: Annotated[OptionalText, Field(description="One of kx ky kxy kyx w0x w0y wg wk.")] = None
     since: Annotated[Since, Field(alias="from", description="Not before this time or day.")] = None
     until: Annotated[Until, Field(alias="to", description="Not after this time or day.")] = None
-    method: Method = "least-squares"
+    method: Annotated[Method | None, Field(description=MAIN)] = None
     by: Annotated[By, Field(description="What a point stands for.")] = "session"
     points: Annotated[
         int | None,
@@ -84,7 +89,10 @@ def over_time(serial: Name, wanted: Annotated[Wanted, Query()], caller: Reader, 
 @router.get("/gyros/{serial}/drift/components", response_model=Listing[ComponentLine],
             responses=TABLE_TOO | {404: {}})  # fmt: skip
 def components(
-    serial: Name, caller: Reader, request: Request, method: Annotated[Method, Query()] = "least-squares"
+    serial: Name,
+    caller: Reader,
+    request: Request,
+    method: Annotated[Method | None, Query(description=MAIN)] = None,
 ) -> Response:
     """How much a gyro's parameters scatter, by source: within a position, between positions, sessions, starts, days."""
     with caller.read() as work:
@@ -96,7 +104,10 @@ def components(
     "/gyros/{serial}/drift/replaced", response_model=Listing[Replaced], responses=TABLE_TOO | {404: {}}
 )
 def replaced(
-    serial: Name, caller: Reader, request: Request, method: Annotated[Method, Query()] = "least-squares"
+    serial: Name,
+    caller: Reader,
+    request: Request,
+    method: Annotated[Method | None, Query(description=MAIN)] = None,
 ) -> Response:
     """Results that count no more because a later revision replaced them."""
     with caller.read() as work:

@@ -86,12 +86,12 @@ def page(
             work, serial, method=wanted.method, parameters=[parameter], since=since, until=until, by=wanted.by,
             newest=_MOST_ROWS, statistics=_STATISTICS,
         )  # fmt: skip
-        known = alarms.alarms(work, gyro=serial, method=wanted.method, state=None)
+        known = alarms.alarms(work, gyro=serial, method=found.method, state=None)
     item = found.parameters[0]
     window = drift_panels.window_of(found, since, until, now)
     return render(
         request, "drift/page.html", gyro=gyro, found=found, item=item, study=item.study or {}, period=chosen(wanted),
-        periods=choices(repaired), method=wanted.method, by=wanted.by, groups=grouping.GROUPS, order=drift_panels.ORDER,
+        periods=choices(repaired), method=found.method, by=wanted.by, groups=grouping.GROUPS, order=drift_panels.ORDER,
         individuals=drift_panels.chart(found, item, window, height=_LARGE_PX),
         statistics=list(_statistics(found, item, window)), standing=drift_panels.status(item, known, window),
         alarms=[alarm for alarm in known if alarm.parameter == parameter],
@@ -105,11 +105,11 @@ def page(
 
 @router.get("/gyros/{serial}/drift/{parameter}/false-alarms")
 def false_alarms(
-    person: Reader, lab: TheLab, serial: str, parameter: str, method: Method = "least-squares"
+    person: Reader, lab: TheLab, serial: str, parameter: str, method: Method | None = None
 ) -> Response:
     """How often the charts of the baseline in force alarm for nothing; takes a second or two when it is new."""
     with lab.read(person) as work:
-        lines = baselines.of_gyro(work, serial, method=method)
+        lines = baselines.of_gyro(work, serial, method=reading.method_of(work, serial, method))
     mine = [line for line in lines if line.parameter == parameter]
     if not mine:
         return HTMLResponse("")

@@ -24,7 +24,7 @@ router = APIRouter()
 PERIODS: Final = {"quarter": 92, "year": 366, "three": 1097, "all": None}
 """Choices of the period, in days back from today."""
 Period = Literal["quarter", "year", "three", "repair", "all"]
-Method = Literal["least-squares", "paper"]
+Method = Literal["least-squares", "generalised", "robust", "paper"]
 Group = Literal["session", "start", "day", "month", "year"]
 _MOST_ROWS: Final = 50
 _SESSIONS: Final = 6
@@ -36,13 +36,16 @@ Day = Annotated[date | None, BeforeValidator(lambda text: text or None)]
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What of a history is wanted: a period by its name or by its days, a grouping, a method."""
+    """What of a history is wanted: a period by its name or by its days, a grouping, a method.
+
+    Without a method it is the one that stands for the gyro.
+    """
 
     period: Period = "year"
     begin: Annotated[Day, Query(alias="from")] = None
     until: Day = None
     by: Group = "session"
-    method: Method = "least-squares"
+    method: Method | None = None
 
 
 Wanted = Annotated[View, Depends()]
@@ -60,7 +63,7 @@ def page(request: Request, person: Reader, lab: TheLab, serial: str, wanted: Wan
             work, serial, method=wanted.method, parameters=ORDER, since=since, until=until, by=wanted.by,
             newest=_MOST_ROWS,
         )  # fmt: skip
-        known = alarms.alarms(work, gyro=serial, method=wanted.method, state=None)
+        known = alarms.alarms(work, gyro=serial, method=found.method, state=None)
         rows = drift_tables.by_session(
             [replace(item, points=item.newest) for item in found.parameters], _MOST_ROWS
         )
@@ -69,7 +72,7 @@ def page(request: Request, person: Reader, lab: TheLab, serial: str, wanted: Wan
     window = drift_panels.window_of(found, since, until, now)
     return render(
         request, "history/page.html", gyro=gyro, found=found, alarms=known, period=chosen(wanted),
-        periods=choices(repaired), method=wanted.method, by=wanted.by, groups=grouping.GROUPS,
+        periods=choices(repaired), method=found.method, by=wanted.by, groups=grouping.GROUPS,
         panels=list(drift_panels.panels(found, window)), rows=rows, total=_results(found.parameters), order=ORDER,
         ahead=any((item.study or {}).get("forecast") for item in found.parameters), repaired=window.breaks,
         bases=drift_tables.bases(found), trends=drift_tables.trends(found), latest=latest, due=holds,
@@ -80,7 +83,7 @@ def page(request: Request, person: Reader, lab: TheLab, serial: str, wanted: Wan
 
 
 @router.get("/gyros/{serial}/study")
-def study(person: Reader, lab: TheLab, serial: str, method: Method = "least-squares") -> Response:
+def study(person: Reader, lab: TheLab, serial: str, method: Method | None = None) -> Response:
     """Whether the study has caught up: nothing while it has not, then htmx is told to show the page anew."""
     with lab.read(person) as work:
         found = reading.gyro_drift(work, serial, method=method, parameters=(), by="session", most=1)
@@ -114,7 +117,7 @@ def exported(
 
 
 @router.get("/gyros/{serial}/repeatability.csv")
-def scatter(person: Reader, lab: TheLab, serial: str, method: Method = "least-squares") -> Response:
+def scatter(person: Reader, lab: TheLab, serial: str, method: Method | None = None) -> Response:
     """The variance components with every digit."""
     with lab.read(person) as work:
         rows = [_component(serial, item) for item in reading.components(work, serial, method=method)]

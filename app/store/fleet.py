@@ -108,6 +108,16 @@ def studies_of(db: Session, gyro_ids: Sequence[int], method: str) -> Sequence[St
     ]
 
 
+def studied_methods(db: Session, gyro_ids: Sequence[int]) -> Sequence[tuple[int, str]]:
+    """Each of these gyros with each method that it has a study by."""
+    rows = db.execute(
+        sa.select(DriftStudy.gyro_id, DriftStudy.method)
+        .where(DriftStudy.gyro_id.in_(gyro_ids))
+        .order_by(DriftStudy.gyro_id, DriftStudy.method)
+    )
+    return [(gyro_id, method) for gyro_id, method in rows if gyro_id is not None]
+
+
 def recalibrations(db: Session, type_id: int, method: str) -> Sequence[dict[str, Any]]:
     """What was found at the end of intervals, of each gyro of a type of which anything was."""
     rows = db.scalars(

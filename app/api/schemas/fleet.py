@@ -101,7 +101,11 @@ class TypeInterval(Outgoing):
 
 
 class Fleet(Outgoing):
-    """All gyros of a type by serial number, what they have in common, and how many are due."""
+    """All gyros of a type by serial number, what they have in common, and how many are due.
+
+    Drift, repeatability and alarms are by `method`, of a gyro without results by it by the first of generalised,
+    robust, paper that it has any of.
+    """
 
     type: str
     method: str

@@ -2,7 +2,8 @@
 
 Values are those of each gyro's last sound calibration (`due`); drift rates, repeatability and recommended
 intervals come from the stored studies, so that the cost does not grow with the length of histories; the intervals
-with the advice of all the type's calibrations (`type_intervals`).
+with the advice of all the type's calibrations (`type_intervals`). Of a gyro without results by least squares it is
+the study by the method that stands for it (`methods`).
 """
 
 import json
@@ -15,6 +16,7 @@ from app.services import verdicts
 from app.services.drift import due, fleet_statistics, intervals, type_intervals
 from app.services.drift.due import Due
 from app.services.drift.fleet_views import Fleet, FleetGyro, Standing, TypeInterval
+from app.services.drift.methods import main_method
 from app.services.lab import Work
 from app.services.views import ParameterView
 from app.store import equipment
@@ -40,8 +42,12 @@ def fleet(work: Work, type_name: str) -> Fleet:
         raise NotFound(problem("unknown-type", "There is no type %(name)s.", name=type_name))
     holds = due.due_list(work, type_name=type_name)
     ids = {row.serial: row.gyro_id for row in stored.last_sound(work.db, type_name=type_name)}
-    studies = {row.gyro_id: row for row in stored.studies_of(work.db, list(ids.values()), METHOD)}
-    alarms = stored.open_alarms(work.db, list(ids.values()), METHOD)
+    methods = _methods(work, list(ids.values()))
+    studies: dict[int, Studied] = {}
+    alarms: dict[int, int] = {}
+    for method, members in methods.items():
+        studies |= {row.gyro_id: row for row in stored.studies_of(work.db, members, method)}
+        alarms |= stored.open_alarms(work.db, members, method)
     results = stored.results_of(work.db, [item.calibration for item in holds if item.calibration is not None])
     documents = {key: json.loads(row.document) for key, row in studies.items() if row.document is not None}
     advice = type_intervals.advice(work, kind, METHOD)
@@ -59,6 +65,17 @@ def fleet(work: Work, type_name: str) -> Fleet:
         correlations=fleet_statistics.correlations(gyros),
         interval=_interval(kind.interval_days, gyros), counts=due.counts(holds),
     )  # fmt: skip
+
+
+def _methods(work: Work, gyro_ids: Sequence[int]) -> dict[str, list[int]]:
+    """By the method that stands for them the gyros that have results."""
+    known: dict[int, list[str]] = {}
+    for gyro_id, method in stored.studied_methods(work.db, gyro_ids):
+        known.setdefault(gyro_id, []).append(method)
+    found: dict[str, list[int]] = {}
+    for gyro_id, methods in known.items():
+        found.setdefault(main_method(methods), []).append(gyro_id)
+    return found
 
 
 def _gyro(

@@ -135,7 +135,7 @@ class TypeInterval:
 
 @dataclass(frozen=True, slots=True)
 class Fleet:
-    """All gyros of a type."""
+    """All gyros of a type; by `method`, and those without results by it by the one that stands for them."""
 
     type: str
     method: str

@@ -2,17 +2,16 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
-from typing import Any, Final
+from typing import Any
 
 from app.exchange.json_values import dumps
 from app.services.drift import baselines, events, series, study
+from app.services.drift.methods import main_method
 from app.services.lab import Work
 from app.store import equipment
 from solver import __version__
 
 Report = Callable[[float, str], None]
-_MAIN: Final = "least-squares"
-"""The method whose study raises alarms; another one's only where this has no result: one finding, one alarm."""
 
 
 def prepare(work: Work, gyro_id: int) -> dict[str, Any]:
@@ -35,6 +34,8 @@ def prepare(work: Work, gyro_id: int) -> dict[str, Any]:
 def studied(payload: Mapping[str, Any], report: Report) -> dict[str, Any]:
     """Study every method's series.
 
+    The one that stands for the gyro raises its alarms: one finding, one alarm.
+
     Returns
     -------
     dict
@@ -43,7 +44,7 @@ def studied(payload: Mapping[str, Any], report: Report) -> dict[str, Any]:
         was found at the end of intervals).
     """
     made = {}
-    heard = _MAIN if _MAIN in payload["series"] else next(iter(payload["series"]), None)
+    heard = main_method(payload["series"])
     for number, (method, content) in enumerate(payload["series"].items()):
         report(number / len(payload["series"]), "studying")
         known = study.Known(

@@ -14,6 +14,7 @@ from app.exchange.json_values import Json
 from app.exchange.si import PARAMETER_UNITS
 from app.services.drift import alarms, baselines, events, grouping, series, type_intervals
 from app.services.drift.charting import CHARTS
+from app.services.drift.methods import METHODS, main_method
 from app.services.drift.series import SeriesTable, aware
 from app.services.drift.views import (
     DriftPoint,
@@ -31,7 +32,6 @@ from app.store import drift, drift_series, results
 from app.store.tables import DriftStudy, Gyro
 from solver.records import PARAMETERS
 
-METHODS: Final = ("least-squares", "generalised", "robust", "paper")
 MOST_POINTS: Final = 120
 """Of one chart: as many as its width shows apart."""
 _HEADS: Final = ("calibration", "session", "start", "stand", "certificate", "revisions")
@@ -41,7 +41,7 @@ def gyro_drift(
     work: Work,
     serial: str,
     *,
-    method: str = "least-squares",
+    method: str | None = None,
     parameters: Sequence[str] = PARAMETERS,
     since: datetime | None = None,
     until: datetime | None = None,
@@ -54,6 +54,8 @@ def gyro_drift(
 
     Parameters
     ----------
+    method
+        None for the one that stands for the gyro (`main_method`).
     parameters
         Which, and in which order.
     since, until
@@ -77,6 +79,8 @@ def gyro_drift(
     _check(method, parameters, by)
     gyro = find_gyro(work, serial)
     studies = drift.studies(work.db, gyro.id, None)
+    methods = sorted((item.method for item in studies), key=METHODS.index)
+    method = method or main_method(methods)
     row = next((item for item in studies if item.method == method), None)
     made = row is not None and row.document is not None
     table = series.decode(row.series) if row is not None and row.series is not None else None
@@ -91,7 +95,7 @@ def gyro_drift(
         if (since is None or item.at >= since) and (until is None or item.at <= until)
     ]
     return GyroDrift(
-        gyro=serial, type=gyro.type.name, method=method, methods=tuple(item.method for item in studies),
+        gyro=serial, type=gyro.type.name, method=method, methods=tuple(methods),
         by=by, up_to_date=row is None or row.studied >= row.changed,
         studied_at=row.studied_at if row else None, solver_version=row.solver_version if row else None,
         job=_job(work, row), sessions=0 if table is None else len(table),
@@ -120,9 +124,16 @@ def all_events(work: Work, serial: str, *, withdrawn: bool = False) -> tuple[Eve
     return tuple(sorted([*entered, *told.values()], key=lambda item: item.at))
 
 
-def components(work: Work, serial: str, *, method: str = "least-squares") -> tuple[Json, ...]:
-    """How much each parameter of a gyro scatters, by source: rows of the study's document with parameter and unit."""
+def method_of(work: Work, serial: str, method: str | None) -> str:
+    """The method that was asked for, or the one that stands for the gyro."""
     _check(method, (), "session")
+    studies = drift.studies(work.db, find_gyro(work, serial).id, None)
+    return method or main_method([item.method for item in studies])
+
+
+def components(work: Work, serial: str, *, method: str | None = None) -> tuple[Json, ...]:
+    """How much each parameter of a gyro scatters, by source: rows of the study's document with parameter and unit."""
+    method = method_of(work, serial, method)
     row = drift.study(work.db, find_gyro(work, serial).id, None, method)
     document = (
         json.loads(row.document) if row is not None and row.document is not None else {"parameters": {}}
@@ -134,9 +145,9 @@ def components(work: Work, serial: str, *, method: str = "least-squares") -> tup
     )
 
 
-def replaced(work: Work, serial: str, *, method: str = "least-squares") -> tuple[ReplacedValue, ...]:
+def replaced(work: Work, serial: str, *, method: str | None = None) -> tuple[ReplacedValue, ...]:
     """Results of a gyro by a method that count no more, with the one that counts in their place, if any."""
-    _check(method, (), "session")
+    method = method_of(work, serial, method)
     gyro = find_gyro(work, serial)
     rows = drift_series.result_rows(work.db, gyro.id)
     values = [item for item in drift_series.value_rows(work.db, gyro.id) if item.method == method]
@@ -157,8 +168,8 @@ def replaced(work: Work, serial: str, *, method: str = "least-squares") -> tuple
     )  # fmt: skip
 
 
-def _check(method: str, parameters: Sequence[str], by: str) -> None:
-    if method not in METHODS:
+def _check(method: str | None, parameters: Sequence[str], by: str) -> None:
+    if method is not None and method not in METHODS:
         raise Invalid(problem("unknown-method", "There is no method “%(method)s”. Choose one of %(methods)s.",
                               column="method", method=method, methods=", ".join(METHODS)))  # fmt: skip
     for name in parameters:

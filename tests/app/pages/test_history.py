@@ -12,9 +12,10 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.services import access, gyros
-from app.services.drift import events
+from app.services.drift import events, fleet
 from app.services.lab import Lab
 from app.store import drift, equipment
+from app.store.tables import Alarm, Baseline, Calibration, CalibrationParameter, DriftStudy
 from solver.records import PARAMETERS
 
 
@@ -269,6 +270,20 @@ def test_the_history_as_a_file(technician: TestClient, results: list[int]) -> No
     assert technician.get(f"{path}.json", params={**query, "method": "paper"}).json() == []
 
 
+@pytest.mark.parametrize(
+    ("table", "count"), [("changes", 2), ("trends", 8), ("forecasts", 8 * 14), ("intervals", 3)]
+)
+def test_what_was_found_as_files(technician: TestClient, results: list[int], table: str, count: int) -> None:
+    page = technician.get("/gyros/0417").text
+    path = f"/gyros/0417/history/{table}"
+    assert f'href="{path}.csv?method=least-squares"' in page
+    rows = list(csv.DictReader(io.StringIO(technician.get(f"{path}.csv").text)))
+    assert len(rows) == len(technician.get(f"{path}.json").json()) == count
+    parquet = technician.get(f"{path}.parquet").content
+    assert pyarrow.parquet.read_table(io.BytesIO(parquet)).column_names == list(rows[0])
+    assert technician.get(f"{path}.csv", params={"method": "robust"}).text.count("\n") == 1
+
+
 def test_a_study_that_is_behind_says_so_until_it_has_caught_up(
     technician: TestClient, lab: Lab, results: list[int]
 ) -> None:
@@ -286,6 +301,31 @@ def test_a_study_that_is_behind_says_so_until_it_has_caught_up(
     answer = technician.get("/gyros/0417/study")
     assert (answer.status_code, answer.headers["hx-refresh"]) == (200, "true")
     assert "A newer result is being taken in" not in technician.get("/gyros/0417").text
+
+
+def test_a_gyro_that_is_solved_by_another_method_only(technician: TestClient, lab: Lab) -> None:
+    """Everything of 0417 is by the robust method: pages choose it, alarms lead there, the fleet counts them."""
+    with lab.write(access.SYSTEM) as work:
+        for table in (CalibrationParameter, DriftStudy, Alarm, Baseline):
+            work.db.query(table).update({"method": "robust"})
+        work.db.query(Calibration).update({"method": "robust"})
+    page = technician.get("/gyros/0417?period=all").text
+    assert len(charts(page)) == len(PARAMETERS)
+    assert "17 results" in page
+    assert "Robust (Huber)" in page
+    assert "Least squares" not in page
+    assert "2 open" in section(page, "alarms")
+    for address in re.findall(r'href="(/gyros/0417[^"#]*)', technician.get("/alarms").text):
+        assert len(charts(technician.get(html.unescape(address)).text)) >= 1
+    assert "Drifting" in technician.get("/gyros/0417/drift/w0y?period=all").text
+    assert technician.get("/gyros/0417/drift/w0y.csv?period=all").text.count("\n") == 18
+    assert "between-days" in technician.get("/gyros/0417/repeatability.csv").text
+    other = technician.get("/gyros/0417?method=least-squares").text
+    assert "No results by this method" in other
+    assert "method=robust" in other
+    with lab.read(access.SYSTEM) as work:
+        (gyro,) = fleet.fleet(work, "GVK-6").gyros
+    assert (gyro.alarms, gyro.sessions) == (2, 17)
 
 
 def test_no_such_gyro_or_period(technician: TestClient) -> None:
