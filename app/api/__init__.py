@@ -19,6 +19,7 @@ from app.api import (
     compare,
     docs,
     drift,
+    drift_tables,
     due,
     events,
     fleet,
@@ -51,7 +52,7 @@ _DESCRIPTION: Final = (
 )
 _NOUNS: Final = (
     gyros, history, drift, events, baselines, alarms, types, fleet, compare, loop, stands, stand_drift,
-    planning, certificates, uploads, sessions, positions, calibrations, due, simulations, station, jobs,
+    drift_tables, planning, certificates, uploads, sessions, positions, calibrations, due, simulations, station, jobs,
     validation, docs,
 )  # fmt: skip
 

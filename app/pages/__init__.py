@@ -24,6 +24,7 @@ from app.pages import (
     choices,
     compare,
     drift,
+    drift_files,
     entry,
     errors,
     events,
@@ -55,7 +56,7 @@ __all__ = ["errors", "mount", "router"]
 router = APIRouter(include_in_schema=False)
 for _noun in (
     today, sessions, session_files, entry, live, results, measurements, gyros, history, drift, baselines,
-    events, alarms, types, fleet, compare, stands, stand_drift, planning, uncertainty, certificates,
+    events, alarms, types, fleet, compare, stands, stand_drift, drift_files, planning, uncertainty, certificates,
     simulations, jobs, method, loop, validation, sign_in, choices, assets,
 ):  # fmt: skip
     router.include_router(_noun.router)

@@ -190,12 +190,15 @@ def document(table: series.SeriesTable, now: datetime) -> dict[str, Any]:
         "until": series.iso(table["measured_at"][-1]) if len(table) else None,
         "parameters": parameters,
         "interval": {
-            "stated_days": 92, "recommended_days": 61.4,
-            "reason": {"template": "%(days)d days: the shortest advice is the control chart's, %(wanted)d days.",
-                       "values": {"days": 61, "wanted": 61}},
-            "methods": [{"method": "staircase", "days": 92.0, "reason": None},
-                        {"method": "control-chart", "days": 61.4, "reason": {
-                            "template": "The course leaves its limits after %(days)d days.", "values": {"days": 61}}}],
+            "stated_days": 92, "recommended_days": 61,
+            "reason": {"code": "interval-chart", "values": {"days": 61, "wanted": 61},
+                       "template": "%(days)d days: the shortest advice is the control chart's, %(wanted)d days."},
+            "findings": None,
+            "methods": [{"method": "staircase", "days": 92, "interval_of": "recalibration", "reason": {
+                            "code": "staircase", "template": "It stays.", "values": {}}},
+                        {"method": "control-chart", "days": 61, "interval_of": "recalibration", "reason": {
+                            "code": "chart", "values": {"days": 61},
+                            "template": "The course leaves its limits after %(days)d days."}}],
         },
     }  # fmt: skip
 

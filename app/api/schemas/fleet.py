@@ -91,7 +91,10 @@ class Correlated(Outgoing):
 
 
 class TypeInterval(Outgoing):
-    """Calibration interval of a type: entered, and as its gyros' own histories recommend it."""
+    """Calibration interval of a type: entered, and as the histories of its gyros recommend it.
+
+    0 days: none keeps the gyro within its limits; `median_days` is of the others.
+    """
 
     stated_days: int | None
     shortest_days: int | None

@@ -117,4 +117,5 @@ def _interval(stated: int | None, gyros: Sequence[FleetGyro]) -> TypeInterval:
     if not days:
         return TypeInterval(stated, None, None, None, 0)
     shortest = min(days, key=lambda serial: days[serial])
-    return TypeInterval(stated, days[shortest], shortest, median_low(days.values()), len(days))
+    holding = [item for item in days.values() if item > 0]
+    return TypeInterval(stated, days[shortest], shortest, median_low(holding) if holding else None, len(days))

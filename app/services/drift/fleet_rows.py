@@ -12,14 +12,15 @@ Cell = float | int | str | datetime | None
 _SUFFIXES: Final = {"deg/h/mA": "deg_per_h_per_ma", "deg/h": "deg_per_h", "deg/h/g": "deg_per_h_per_g"}
 
 
-def _field(name: str) -> str:
+def field(name: str) -> str:
+    """The name of a parameter's column, with its unit."""
     return f"{name}_{_SUFFIXES[PARAMETER_UNITS[name][0]]}"
 
 
 _PARTS: Final = ("", "_u", "_slope_per_year", "_u_slope_per_year", "_scatter")
 COLUMNS: Final = (
     "gyro", "type", "check", "verdict", "due", "due_state", "sessions", "session", "calibration", "measured_at",
-    "alarms", "recommended_days", *(f"{_field(name)}{part}" for name in PARAMETERS for part in _PARTS),
+    "alarms", "recommended_days", *(f"{field(name)}{part}" for name in PARAMETERS for part in _PARTS),
 )  # fmt: skip
 
 
@@ -41,5 +42,5 @@ def _row(gyro: FleetGyro) -> dict[str, Cell]:
         cells = (
             (item.value.value, item.value.u, item.slope, item.u_slope, item.scatter) if item else (None,) * 5
         )
-        row |= {f"{_field(name)}{part}": cell for part, cell in zip(_PARTS, cells, strict=True)}
+        row |= {f"{field(name)}{part}": cell for part, cell in zip(_PARTS, cells, strict=True)}
     return row

@@ -122,8 +122,8 @@ class Correlated:
 class TypeInterval:
     """The interval of a type: entered, and what its gyros' own histories recommend.
 
-    `shortest` is the smallest recommendation with the gyro it comes from, `median` the middle one, of two the
-    shorter, `gyros` how many have one.
+    `shortest` is the smallest recommendation with the gyro it comes from, `median` the middle one of
+    those that hold at all, of two the shorter, `gyros` how many have one. 0 days: none keeps the gyro within limits.
     """
 
     stated_days: int | None

@@ -84,6 +84,66 @@ def test_points_that_are_left_out_are_told(client: httpx.Client, lab: Lab) -> No
     assert len(client.get("/stands/S1/drift?by=day", headers=CSV).text.splitlines()) == 251
 
 
+@pytest.mark.parametrize(
+    ("address", "count", "first"),
+    [
+        ("/types/GVK-6/fleet/distributions", 8, "parameter"),
+        ("/types/GVK-6/fleet/correlations", 28, "first"),
+        ("/types/GVK-6/fleet/components", None, "parameter"),
+        ("/stands/S1/drift/findings", 1, "verdict"),
+        ("/gyros/0417/drift/trends", 8, "parameter"),
+        ("/gyros/0417/drift/forecasts", None, "parameter"),
+        ("/gyros/0417/drift/changes", None, "parameter"),
+        ("/gyros/0417/drift/intervals", None, "method"),
+    ],
+)
+def test_what_was_found_as_tables(
+    client: httpx.Client, lab: Lab, address: str, count: int | None, first: str
+) -> None:
+    items = client.get(address).json()["items"]
+    assert count in (None, len(items))
+    lines = client.get(address, headers=CSV).text.splitlines()
+    assert len(lines) == 1 + len(items)
+    assert lines[0].split(",")[0] == first
+    table = pq.read_table(io.BytesIO(client.get(address, headers=PARQUET).content))
+    assert table.num_rows == len(items)
+    assert not items or table.column_names == list(items[0])
+
+
+def test_the_tables_hold_what_the_documents_do(client: httpx.Client, lab: Lab) -> None:
+    fleet = client.get("/types/GVK-6/fleet").json()
+    rows = client.get("/types/GVK-6/fleet/components").json()["items"]
+    assert [(row["parameter"], row["source"], row["sd"]) for row in rows] == [
+        (name, item["source"], item["sd"]) for name, found in fleet["pooled"].items() for item in found
+    ]
+    assert rows
+    row = client.get("/types/GVK-6/fleet/distributions").json()["items"][4]
+    whole = next(item for item in fleet["distributions"] if item["parameter"] == row["parameter"])
+    assert [row["lower_quartile"], row["median"], row["upper_quartile"]] == whole["quartiles"]
+    found = client.get("/stands/S1/drift").json()["document"]["findings"][0]
+    (row,) = client.get("/stands/S1/drift/findings").json()["items"]
+    assert (row["direction"], row["size_arcsec"], row["session"]) == (
+        "azimuth", found["size_arcsec"], found["session"],
+    )  # fmt: skip
+    assert datetime.fromisoformat(row["until"]) == datetime.fromisoformat(found["until"])
+    study = client.get("/gyros/0417/drift").json()["parameters"]
+    bands = client.get("/gyros/0417/drift/forecasts").json()["items"]
+    assert len(bands) == sum(len(item["study"]["forecast"]["at"]) for item in study)
+    assert bands[0]["high"] == study[0]["study"]["forecast"]["high"][0]
+    slopes = {
+        row["parameter"]: row["slope_per_year"]
+        for row in client.get("/gyros/0417/drift/trends").json()["items"]
+    }
+    assert slopes == {item["parameter"]: item["study"]["trend"]["slope_per_year"] for item in study}
+
+
+def test_no_study_no_rows(client: httpx.Client, service: Service, stand: httpx.Client) -> None:
+    assert client.get("/gyros/0417/drift/intervals").json() == {"items": [], "next": None}
+    assert client.get("/gyros/0417/drift/nothing").status_code == 422
+    assert client.get("/gyros/none/drift/changes").status_code == 404
+    assert client.get("/stands/none/drift/findings").status_code == 404
+
+
 def test_differences_are_in_units_of_their_uncertainty(client: httpx.Client, lab: Lab) -> None:
     found = client.get("/compare?a=session:1&b=session:2").json()
     item = next(item for item in found["parameters"] if item["parameter"] == "w0x")

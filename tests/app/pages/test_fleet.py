@@ -85,3 +85,17 @@ def test_the_same_as_files(designer: TestClient, fleet: Lab) -> None:
     table = pq.read_table(io.BytesIO(designer.get("/types/GVK-6/fleet.parquet").content))
     assert table["w0x_deg_per_h"].to_pylist() == [*VALUES.values(), None]
     assert len(designer.get("/types/GVK-6/fleet.json").json()) == 6
+
+
+@pytest.mark.parametrize("table", ["distributions", "components", "correlations"])
+def test_what_they_have_in_common_as_files(designer: TestClient, fleet: Lab, table: str) -> None:
+    page = designer.get("/types/GVK-6/fleet").text
+    rows = designer.get(f"/types/GVK-6/fleet/{table}.json").json()
+    for form in ("csv", "parquet"):
+        address = f"/types/GVK-6/fleet/{table}.{form}"
+        assert f'href="{address}"' in page or table == "components"
+        answer = designer.get(address)
+        assert f'filename="{table}-GVK-6.{form}"' in answer.headers["content-disposition"]
+    assert len(
+        list(csv.reader(io.StringIO(designer.get(f"/types/GVK-6/fleet/{table}.csv").text)))
+    ) == 1 + len(rows)
