@@ -7,6 +7,7 @@ can be gone on after: an instrument that was lost is waited for, an emergency st
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from datetime import timedelta
 from typing import Final
 
 from app.errors import AppError, Problem, problem
@@ -15,7 +16,8 @@ from app.station.contracts import EmergencyStop, InstrumentFault, InstrumentLost
 from app.station.controls import StopAsked
 from app.station.finishing import Finishing, NotFinished
 from app.station.keeping.durable import SpoolFailed
-from app.station.keeping.entries import Abandoned, Said, Warmed
+from app.station.keeping.entries import Abandoned, Cooled, Said, Warmed
+from app.station.keeping.history import LONGEST_BREAK
 from app.station.measuring import TakeFailed, go, measure, settle
 from app.station.plan import Compare, Finish, Forward, Measure, Prepare, Solve, Step, WarmUp, next_step
 from app.station.preparing import Preparing
@@ -24,6 +26,11 @@ from app.station.workplace import Workplace
 from solver.errors import Message
 
 _FIRST_PAUSE_S: Final = 0.2
+_COOLED: Final = Message(
+    "maybe-cooled",
+    "The power may have been away: the stand has lost its reference, or did not answer for long. It is waited until "
+    "the gyro is warm.",
+)
 _LONGEST_PAUSE_S: Final = 10.0
 """Between attempts to reach a lost instrument, on the wall's clock."""
 
@@ -80,6 +87,7 @@ class Cycle:
             return  # nothing is left to measure
         try:
             self._identify()
+            self._heed_power()
         except InstrumentLost as lost:
             if not self.at.history.places:
                 raise
@@ -156,16 +164,30 @@ class Cycle:
         """Wait until both instruments answer; what is to be done then follows from how they stand."""
         at = self.at
         at.spool.note("warning", lost.problems[0].message)
-        pause_s = _FIRST_PAUSE_S
+        pause_s, since = _FIRST_PAUSE_S, at.clock.now()
         while True:
             at.rest(pause_s)
             try:
                 self._identify()
+                self._heed_power(away=at.clock.now() - since)
             except InstrumentLost:
                 pause_s = min(2.0 * pause_s, _LONGEST_PAUSE_S)
             else:
                 at.spool.note("info", Message("instruments-back", "Both instruments answer again."))
                 return
+
+    def _heed_power(self, away: timedelta = timedelta(0)) -> None:
+        """Let the gyro warm up anew if it may have been without power: a stand loses its reference then."""
+        at = self.at
+        if at.history.warmed and (away > LONGEST_BREAK or self._lost_reference()):
+            at.spool.add(Cooled(Said.of(_COOLED)))
+
+    def _lost_reference(self) -> bool:
+        try:
+            return not self.at.stand.status().homed
+        except InstrumentFault as fault:  # it reports an error of its own: nothing is sure
+            self.at.spool.note("warning", fault.problems[0].message)
+            return True
 
     def _stand_still(self, pressed: EmergencyStop) -> None:
         """An emergency stop: give the record up, and go on only when a person is there and says so.

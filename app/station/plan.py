@@ -59,16 +59,14 @@ def next_step(history: History, *, leave_out: bool) -> Step:
     """
     if not history.places:
         return Prepare()
-    if not history.warmed:
-        return WarmUp()
     attempt = history.open_attempt
-    if attempt is not None:
-        return Measure(attempt.target)
-    if not history.compared:
+    if attempt is not None and attempt.acquiring is not None:
+        return Measure(attempt.target)  # what the ammeter has acquired is brought home before anything moves
+    if attempt is None and not history.compared:
         return Compare()
-    for target in history.targets:
-        if history.wanted(target):
-            return Measure(target)
+    target = attempt.target if attempt is not None else next(filter(history.wanted, history.targets), None)
+    if target is not None:
+        return Measure(target) if history.warmed else WarmUp()
     if history.session is None or history.to_send():
         return Forward()
     if history.result is None and all(

@@ -114,6 +114,23 @@ class Warmed:
 
 
 @dataclass(frozen=True, slots=True)
+class Cooled:
+    """The gyro may have been without power: whether it is warm is to be seen anew."""
+
+    why: Said
+    kind: Literal["cooled"] = "cooled"
+
+
+@dataclass(frozen=True, slots=True)
+class Damaged:
+    """The disk does not give back the record of a take: it is worth nothing and is measured anew."""
+
+    attempt: int
+    why: Said
+    kind: Literal["damaged"] = "damaged"
+
+
+@dataclass(frozen=True, slots=True)
 class Started:
     """The cycle turns to a target, to move there, settle and acquire; `take` counts what was judged at the place."""
 
@@ -242,15 +259,15 @@ class Unsolved:
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """The run is over, and why it has no calibration, if it has none or one of fewer positions."""
+    """The run is over: why it has no calibration, if it has none or one of fewer positions, and what is in doubt."""
 
     reasons: tuple[Said, ...]
     kind: Literal["finished"] = "finished"
 
 
 Entry = (
-    Begun | Resumed | Planned | Opened | Warmed | Started | Acquiring | Abandoned | Judged | Compared | Noted
-    | Commanded | Sent | Rejected | Queued | Solved | Unsolved | Finished
+    Begun | Resumed | Planned | Opened | Warmed | Cooled | Started | Acquiring | Abandoned | Judged | Damaged
+    | Compared | Noted | Commanded | Sent | Rejected | Queued | Solved | Unsolved | Finished
 )  # fmt: skip
 
 _ENTRY: Final[TypeAdapter[Entry]] = TypeAdapter(Annotated[Entry, Field(discriminator="kind")])

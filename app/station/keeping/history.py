@@ -1,7 +1,8 @@
 """How a run stands, folded from its journal: which takes there are of each target, what is sent, what was said."""
 
-from dataclasses import dataclass, field
-from datetime import datetime
+from dataclasses import dataclass, field, replace
+from datetime import datetime, timedelta
+from typing import Final
 
 from app.station.contracts import Place
 from app.station.keeping.entries import (
@@ -10,7 +11,10 @@ from app.station.keeping.entries import (
     Begun,
     Commanded,
     Compared,
+    Cooled,
+    Damaged,
     Entry,
+    Finding,
     Finished,
     Judged,
     Level,
@@ -29,6 +33,9 @@ from app.station.keeping.entries import (
     Verdict,
     Warmed,
 )
+
+LONGEST_BREAK: Final = timedelta(minutes=10)
+"""Nobody knows what happened to the gyro while the station looked away for longer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +97,8 @@ class History:
     """Largest rotation that the stand's certificate states, None where none was heard of."""
     session: int | None = None
     warmed: bool = False
+    last_at: datetime | None = None
+    """When the newest line was written."""
     attempts: list[Attempt] = field(default_factory=list)
     asked_after: dict[Target, int] = field(default_factory=dict)
     """Number of takes that there were of a target when it was last asked for anew."""
@@ -105,13 +114,15 @@ class History:
     finished: Finished | None = None
 
     def apply(self, at: datetime, entry: Entry) -> None:
-        """Take in the next line."""
+        """Take in the next line, written at that moment."""
         self._tell(at, entry)
         match entry:
             case Begun():
                 self.begun = entry
             case Resumed():
                 self.starts += 1
+                if self.last_at is not None and at - self.last_at > LONGEST_BREAK:
+                    self.warmed = False
             case Planned():
                 self.places, self.gyro_type = entry.places, entry.gyro_type
                 self.turned_arcsec = entry.turned_arcsec
@@ -119,6 +130,10 @@ class History:
                 self.session = entry.session
             case Warmed():
                 self.warmed = True
+            case Cooled():
+                self.warmed = False
+            case Damaged():
+                self._spoil(self.attempts[entry.attempt], entry.why)
             case Started():
                 self.attempts.append(Attempt(entry))
             case Compared():
@@ -139,6 +154,7 @@ class History:
             case _:
                 self.compared = self.compared and not isinstance(entry, Judged)
                 _of_attempt(self.attempts[entry.attempt], entry)
+        self.last_at = at
 
     def _tell(self, at: datetime, entry: Entry) -> None:
         """Number what a person should know of a line."""
@@ -159,6 +175,14 @@ class History:
         elif isinstance(entry, Abandoned):
             place = self.attempts[entry.attempt].target.place
             self._event(at, "warning", entry.why, place)
+        elif isinstance(entry, Damaged):
+            place = self.attempts[entry.attempt].target.place
+            self._event(at, "error", entry.why, place)
+        elif isinstance(entry, Cooled):
+            self._event(at, "warning", entry.why, None)
+        elif isinstance(entry, Finished):
+            for reason in entry.reasons:
+                self._event(at, "warning" if self.result else "error", reason, None)
 
     def _event(self, at: datetime, level: Level, said: Said, place: Place | None) -> None:
         self.events.append(Event(len(self.events) + 1, at, level, said, place))
@@ -183,6 +207,13 @@ class History:
             self.compared = False  # what waited for this target's next take waits no longer
         elif entry.what == "retake":
             self._ask_anew(entry.target)
+
+    def _spoil(self, attempt: Attempt, why: Said) -> None:
+        """Let a take count for nothing, and want another if it was the one that counted."""
+        assert attempt.judged is not None
+        attempt.judged = replace(attempt.judged, verdict="refused", findings=(Finding(why),))
+        if self.standing(attempt.target) is attempt:
+            self._ask_anew(attempt.target)
 
     def _ask_anew(self, target: Target) -> None:
         """Want further takes; of what is compared with this target (the closing record with the first) too."""

@@ -16,7 +16,7 @@ from typing import Final, Self
 
 from filelock import FileLock, Timeout
 
-from app.errors import Conflict, problem
+from app.errors import AppError, Conflict, problem
 from app.exchange.record_files import write_record_parquet
 from app.exchange.rows import CurrentRecord
 from app.station.contracts import Place
@@ -28,6 +28,10 @@ from app.station.keeping.journal import Journal, read_journal
 from solver.errors import Message
 
 _JOURNAL: Final = "journal.jsonl"
+
+
+class RecordDamaged(AppError):
+    """A record file is not what was written; the take can be measured again."""
 
 
 class Spool:
@@ -104,18 +108,20 @@ class Spool:
 
         Raises
         ------
-        SpoolFailed
+        RecordDamaged
             The file is not what was written.
+        SpoolFailed
+            It cannot be read.
         """
         judged = attempt.judged
         path = self._record(attempt.number)
-        content = durable.read_whole(path)
+        content = durable.read_whole(path) if path.exists() else b""
         if judged is None or hashlib.sha256(content).hexdigest() != judged.digest:
-            raise durable.SpoolFailed(
+            raise RecordDamaged(
                 problem(
                     "record-damaged",
-                    "%(path)s does not hold what was written to it: the disk is damaged. Ask for this position "
-                    "to be measured again.",
+                    "%(path)s does not hold what was written to it: the disk is damaged. This position is "
+                    "measured again.",
                     path=str(path),
                 )
             )

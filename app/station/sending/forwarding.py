@@ -10,9 +10,9 @@ from contextlib import closing
 from typing import Final
 
 from app.errors import AppError
-from app.station.keeping.entries import Opened, Rejected, Said, Sent
+from app.station.keeping.entries import Damaged, Opened, Rejected, Said, Sent
 from app.station.keeping.history import Attempt
-from app.station.keeping.spool import Spool
+from app.station.keeping.spool import RecordDamaged, Spool
 from app.station.sending.client import ServerRefused, Unreachable
 from app.station.sending.service import Service
 from solver.errors import Message
@@ -97,9 +97,11 @@ class Forwarder(threading.Thread):
         return True
 
     def _send(self, service: Service, session: int, attempt: Attempt) -> None:
-        content = self._spool.record(attempt)
         try:
+            content = self._spool.record(attempt)
             service.put_record(session, attempt, content)
+        except RecordDamaged as damaged:
+            self._spool.add(Damaged(attempt.number, Said.of(damaged.problems[0].message)))
         except ServerRefused as refused:
             if refused.answered not in _OF_THE_RECORD:
                 raise

@@ -4,6 +4,9 @@ import signal
 import threading
 import time
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +18,7 @@ from app.station.clock import Deadline
 from app.station.contracts import Currents, EmergencyStop, InstrumentFault, InstrumentLost, Place
 from app.station.controls import Command, Controls, StopAsked
 from app.station.finishing import NotFinished
+from app.station.keeping import spool
 from app.station.keeping.entries import Target
 from app.station.keeping.spool import Spool, history_in
 from app.station.sending import forwarding
@@ -323,6 +327,61 @@ def test_a_stand_that_lost_its_reference_is_homed_again(room):
     assert len(room.service.records) == 4
 
 
+def watched_warm_ups(room: Room, monkeypatch) -> list[object]:
+    """A list that grows by each warm-up."""
+    made: list[object] = []
+
+    def warming(self):
+        made.append(self)
+        return Never(True)
+
+    monkeypatch.setattr(type(room.judge), "warming", warming)
+    return made
+
+
+def stop_at_fetch(room: Room, number: int) -> None:
+    """Let a first life of the program end when the number-th block is fetched."""
+    at_fetch(room, number, lambda: room.controls.give([Command(1, "stop")]))
+    with pytest.raises(StopAsked):
+        room.run()
+    room.controls = Controls()
+
+
+@pytest.mark.parametrize(("homed", "warm_ups"), [(True, 1), (False, 2)])
+def test_after_a_power_cut_the_gyro_is_warmed_up_anew(room, monkeypatch, homed, warm_ups):
+    made = watched_warm_ups(room, monkeypatch)
+    stop_at_fetch(room, 4)
+    room.stand.homed = homed
+    assert room.run().result is not None
+    assert len(made) == warm_ups
+
+
+def test_a_power_cut_while_the_station_goes_on_is_one_too(room, monkeypatch):
+    made = watched_warm_ups(room, monkeypatch)
+
+    def power_cut() -> None:
+        room.stand.homed = False
+        lost()
+
+    at_fetch(room, 4, power_cut)
+    history = room.run()
+    assert len(made) == 2
+    assert "maybe-cooled" in {event.said.code for event in history.events}
+
+
+@pytest.mark.parametrize(("away", "warm_ups"), [(timedelta(minutes=1), 1), (timedelta(hours=1), 2)])
+def test_after_a_long_break_the_gyro_is_warmed_up_anew(room, monkeypatch, away, warm_ups):
+    made = watched_warm_ups(room, monkeypatch)
+    stop_at_fetch(room, 4)
+    later = datetime.now(UTC) + away
+    monkeypatch.setattr(spool, "datetime", SimpleNamespace(now=lambda zone: later))
+    history = room.run()
+    assert history.result is not None
+    assert len(made) == warm_ups
+    # What the ammeter had acquired meanwhile is not lost by it.
+    assert [attempt.abandoned for attempt in history.attempts] == [None] * 4
+
+
 def test_an_instruments_fault_refuses_the_take_and_the_next_repairs_it(room):
     def stalled() -> None:
         raise InstrumentFault(problem("motor", "The motor is too hot."))
@@ -489,6 +548,24 @@ def test_a_second_station_on_the_folder_is_refused(room):
     with Spool(room.folder), pytest.raises(Exception, match=r"Another station works on .*spool"):
         Spool(room.folder)
     Spool(room.folder).close()
+
+
+@pytest.mark.parametrize(
+    "ruin", [lambda path: path.write_bytes(b"?"), Path.unlink], ids=["other bytes", "gone"]
+)
+def test_a_record_that_the_disk_lost_is_measured_again(room, ruin):
+    room.service.trouble = [away()] * 10**6
+    at_move(room, 4, lambda: room.controls.give([Command(1, "stop")]))
+    with pytest.raises(StopAsked):
+        room.run()
+    room.controls, room.service.trouble = Controls(), []
+    ruin(room.folder / "records" / "000001.parquet")
+    history = room.run()
+    target = history.attempts[1].target
+    assert [attempt.verdict for attempt in history.takes(target)] == ["refused", "accepted"]
+    assert "record-damaged" in {event.said.code for event in history.events}
+    assert (history.finished.reasons, history.result is not None) == ((), True)
+    assert len(room.service.records[target]) == 1
 
 
 def test_samples_are_those_of_the_take(room):
