@@ -98,7 +98,8 @@ def run(
 ) -> None:  # fmt: skip
     """Measure a gyro in all positions and have it calibrated; the same command goes on with an unfinished run.
 
-    Ctrl-C ends it and keeps everything. Exit code 0: all positions are measured and the calibration fits them.
+    Ctrl-C ends it and keeps everything. Exit code 0: all positions are measured, no check objects to any, and the
+    calibration finds every parameter and fits them.
     """
     described = station_file(config, stand_address=stand_address, ammeter_address=ammeter_address)
     orders = Orders(
@@ -158,7 +159,8 @@ class _Teller:
         line = _line(entry, history)
         if line:
             typer.echo(line)
-        for event in history.events[self._told :]:
+        # What was told when the run was over stands beside its result.
+        for event in history.events[self._told :] if entry.kind != "finished" else ():
             place = f"{event.place.theta_deg:g}/{event.place.psi_deg:g}: " if event.place else ""
             typer.echo(
                 f"{event.level}: {place}{event.said.text} [{event.said.code}]", err=event.level != "info"
@@ -184,7 +186,8 @@ def _line(entry: Entry, history: History) -> str | None:
 
 def _verdict(orders: Orders, history: History) -> None:
     """Print the calibration and what it lacks; say by the exit code whether all is well."""
-    for reason in history.finished.reasons if history.finished else ():
+    reasons = history.finished.reasons if history.finished else ()
+    for reason in reasons:
         typer.echo(f"driftbook: {reason.text}", err=True)
     if history.result is None:
         typer.echo("driftbook: No calibration was asked for. Measure these positions again.", err=True)
@@ -196,7 +199,7 @@ def _verdict(orders: Orders, history: History) -> None:
     against = list(_objections(result["least-squares"] if result["method"] == "both" else result))
     for line in against:
         typer.echo(f"driftbook: {line}", err=True)
-    if against:
+    if against or reasons:
         raise typer.Exit(1)
 
 

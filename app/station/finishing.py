@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.errors import AppError
+from app.station.comparing import means
 from app.station.keeping.entries import Finished, Queued, Said, Solved, Target, Unsolved
 from app.station.measuring import shown
 from app.station.plan import Forward, Solve, Step, missing, next_step
@@ -64,7 +65,7 @@ class Finishing:
                 self.at.rest(pause_s)
 
     def finish(self) -> None:
-        """Write down that nothing is left to do, and what the calibration lacks."""
+        """Write down that nothing is left to do, and what the calibration lacks or leaves in doubt."""
         at = self.at
         if at.history.finished is None:
             at.spool.add(Finished(tuple(Said.of(reason) for reason in self._reasons())))
@@ -89,10 +90,31 @@ class Finishing:
             raise
 
     def _reasons(self) -> Iterator[Message]:
-        for target in missing(self.at.history):
+        history = self.at.history
+        for target in missing(history):
             why = " ".join(dict.fromkeys(said.text for said in self._why(target)))
             yield Message("position-missing", "%(place)s is not in the session: %(why)s",
                           {"place": named(target), "why": why})  # fmt: skip
+        for target in history.targets:
+            doubtful = self._doubtful(target)
+            if doubtful:
+                yield Message("position-suspicious", "%(place)s is suspicious: %(why)s",
+                              {"place": named(target), "why": " ".join(doubtful)})  # fmt: skip
+        unseen = self.at.judge.unseen(means(history)) if history.result is not None else ()
+        if unseen:
+            yield Message(
+                "position-unseen",
+                "Nothing would show it if one of these had been measured in another position: %(places)s. Measure "
+                "pairs half a turn of ψ apart, three or more, or further positions.",
+                {"places": ", ".join(map(shown, unseen))},
+            )
+
+    def _doubtful(self, target: Target) -> tuple[str, ...]:
+        """What the checks said of a take that is used all the same."""
+        take = self.at.history.usable(target)
+        if take is None or take.rejected is not None or take.judged is None:
+            return ()
+        return tuple(dict.fromkeys(finding.said.text for finding in take.judged.findings))
 
     def _why(self, target: Target) -> Iterator[Said]:
         standing = self.at.history.standing(target)

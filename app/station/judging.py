@@ -8,7 +8,7 @@ import numpy as np
 
 from app.exchange.rows import CurrentRecord
 from app.station.contracts import Currents, Place
-from app.station.judgement import checks, partners
+from app.station.judgement import checks, control, partners
 from app.station.judgement.checks import Take
 from app.station.judgement.expectations import Expectations, Thresholds
 from app.station.judgement.settling import RestRule, RestWatch
@@ -24,8 +24,8 @@ _WRONG_BY: Final = frozenset({"drifting"})
 class Stillness(Protocol):
     """Follows readings until they keep still."""
 
-    def add(self, at_s: float, currents: Currents) -> bool:
-        """Take a reading in; tell whether the currents are still now."""
+    def add(self, at_s: float, currents: Currents) -> bool | None:
+        """Take a reading in; tell whether the currents are still now, None as long as nobody can tell."""
 
 
 class Judge(Protocol):
@@ -47,13 +47,16 @@ class Judge(Protocol):
     ) -> Iterable[tuple[Message, tuple[Place, ...]]]:
         """Places whose currents do not fit the others', and how."""
 
+    def unseen(self, means: Mapping[Place, Currents]) -> tuple[Place, ...]:
+        """Places of which nothing would show that they were measured in another position."""
+
 
 @dataclass(frozen=True, slots=True)
 class _Watch:
     watch: RestWatch
 
-    def add(self, at_s: float, currents: Currents) -> bool:
-        return self.watch.add(at_s, *currents).settled is True
+    def add(self, at_s: float, currents: Currents) -> bool | None:
+        return self.watch.add(at_s, *currents).settled
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +109,10 @@ class Rules:
         """Pairs of partners whose sum is not that of the others."""
         for pair in partners.odd_pairs(means, self._partners_na(history)):
             yield pair.message, pair.places
+
+    def unseen(self, means: Mapping[Place, Currents]) -> tuple[Place, ...]:
+        """As the protocol says."""
+        return control.unseen(means)
 
     def _partners_na(self, history: History) -> float:
         """What sums of partners may differ by: what matters, and what the certified angles do of themselves."""

@@ -109,6 +109,13 @@ def odd_pairs(means: Mapping[Place, Currents], tolerance_na: float) -> tuple[Odd
     return tuple(found)
 
 
+def without_comparison(means: Mapping[Place, Currents]) -> tuple[Place, ...]:
+    """Places that `odd_pairs` says nothing of: those without a partner, and all while there are too few pairs."""
+    pairs = dict(_sums(means))
+    seen = {place for pair in pairs for place in pair} if len(pairs) >= _FEWEST else set()
+    return tuple(place for place in means if place not in seen)
+
+
 def by_angles_na(angle_arcsec: float, scale_deg_per_h_per_ma: float, g_drift_deg_per_h: float = 0.0) -> float:
     """What certified angles do to a difference of sums at most, nA.
 

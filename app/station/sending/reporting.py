@@ -160,7 +160,7 @@ def _state(history: History, target: Target, now: Activity) -> str:
     standing = history.standing(target)
     if standing is None or history.wanted(target):
         return "todo"
-    verdict = standing.verdict
+    verdict = "refused" if standing.rejected else standing.verdict
     return "recorded" if verdict == "accepted" else str(verdict)
 
 

@@ -311,11 +311,16 @@ def test_parameters_that_were_not_found_are_no_success(laboratory, cycle):
 
 
 def test_a_wrong_position_that_has_no_partners_to_show_it_is_no_success(laboratory, cycle):
-    """Four positions: the fit takes the mistake for another scale factor, of half the true one."""
+    """Four positions: the fit takes the mistake for another scale factor, of half the true one.
+
+    The gyro is the test's own: the next calibration of it would be held against this one.
+    """
+    with laboratory.service.client() as client:
+        assert client.post("/gyros", json={"serial": "0418", "type": "GVK-6"}).status_code == 201
     bench = bench_of("gvk-6")
     stand = laboratory.stand_of(bench)
     with instruments(bench, faults=["wrong-position@0/180!"]) as served:
-        run = cycle(served, stand, "--positions", "0/0,0/90,0/180,90/0")
+        run = cycle(served, stand, "--gyro", "0418", "--positions", "0/0,0/90,0/180,90/0")
     assert run.code == 1
     assert run.result["parameters"]["kx"]["value"] < 0.6 * truth_values(bench.gyro)["kx"]
     assert "another position: 0/0, 0/90, 0/180, 90/0." in run.err

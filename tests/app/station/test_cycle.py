@@ -56,6 +56,9 @@ def test_what_fails_twice_is_refused_by_name_and_nothing_is_computed(room):
     assert [reason.text for reason in history.finished.reasons] == [
         "0/180 is not in the session: There is a stuck."
     ]
+    assert [(event.level, event.said.code) for event in history.events[-1:]] == [
+        ("error", "position-missing")
+    ]
 
 
 def test_a_calibration_without_the_refused_one_is_asked_for_when_told(room):
@@ -94,5 +97,16 @@ def test_a_suspicious_take_is_sent_when_the_next_is_no_better(room):
     room.judge.objections |= {(target, take): noise for take in range(9)}
     history = room.run()
     np.testing.assert_array_equal(samples(room.service.records[target][0]), true_record(PLACES[2], 1))
-    assert [event.said.code for event in history.events] == ["noise", "noise"]
     assert history.result is not None
+    # It is used, and said to be suspicious to the end.
+    assert [event.said.code for event in history.events] == ["noise", "noise", "position-suspicious"]
+    assert [reason.text for reason in history.finished.reasons] == ["90/0 is suspicious: There is a noise."]
+
+
+def test_positions_of_which_nothing_would_show_a_mistake_are_named_when_there_is_a_result(room):
+    room.judge.alone = PLACES[:2]
+    history = room.run()
+    (reason,) = history.finished.reasons
+    assert reason.code == "position-unseen"
+    assert reason.values == {"places": "0/0, 0/180"}
+    assert [(event.level, event.said) for event in history.events] == [("warning", reason)]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.station.contracts import Currents, Place
-from app.station.judgement.partners import by_angles_na, odd_pairs, partner_of
+from app.station.judgement.partners import by_angles_na, odd_pairs, partner_of, without_comparison
 from simdevice.ammeter import Ammeter
 from simdevice.bench import Bench, position_record, steady_currents
 from simdevice.certificate import Position, certify
@@ -119,7 +119,10 @@ def test_fewer_than_three_pairs_tell_nothing():
     good = means(scenario("gvk-6").bench(4), {Place(0.0, 0.0): Place(0.0, 90.0)})
     two = {place: good[place] for place in SIXTEEN[:4]}
     assert odd_pairs(two, 100.0) == ()
+    assert without_comparison(two) == tuple(SIXTEEN[:4])
     three = {place: good[place] for place in [*SIXTEEN[:4], SIXTEEN[4], SIXTEEN[6]]}
+    assert without_comparison(three) == ()
+    assert without_comparison(three | {SIXTEEN[8]: Currents(0.0, 0.0)}) == (SIXTEEN[8],)
     (odd,) = odd_pairs(three, 100.0)
     assert set(odd.places) == {Place(0.0, 0.0), Place(0.0, 180.0)}
 
