@@ -2,11 +2,23 @@
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
+from typing import Final
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
 from app.store.tables import Gyro, Measurement, MeasuringSession, Record, Stand
+
+LAST_FIRST: Final = (MeasuringSession.started_at.desc(), MeasuringSession.id.desc())
+"""Order of sessions by when they were measured; of one moment the one that was opened later comes first."""
+
+
+def follows(number: int) -> sa.ColumnElement[bool]:
+    """Whether a session comes after the one of that number in `LAST_FIRST`."""
+    one = sa.orm.aliased(MeasuringSession)
+    at = sa.select(one.started_at).where(one.id == number).scalar_subquery()
+    here = MeasuringSession
+    return sa.and_(here.started_at <= at, sa.or_(here.started_at < at, here.id < number))
 
 
 def session(db: Session, session_id: int) -> MeasuringSession | None:
@@ -24,8 +36,8 @@ def sessions(
     before: int | None = None,
     limit: int = 50,
 ) -> Sequence[MeasuringSession]:
-    """Sessions, the newest number first, those below `before`."""
-    query = sa.select(MeasuringSession).order_by(MeasuringSession.id.desc()).limit(limit)
+    """Sessions, the last one measured first, those that come after the one of number `before`."""
+    query = sa.select(MeasuringSession).order_by(*LAST_FIRST).limit(limit)
     if gyro is not None:
         query = query.join(Gyro, Gyro.id == MeasuringSession.gyro_id).where(Gyro.serial == gyro)
     if stand is not None:
@@ -35,7 +47,7 @@ def sessions(
     if until is not None:
         query = query.where(MeasuringSession.started_at <= until)
     if before is not None:
-        query = query.where(MeasuringSession.id < before)
+        query = query.where(follows(before))
     return db.scalars(query).all()
 
 

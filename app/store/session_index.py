@@ -6,6 +6,7 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
+from app.store.measurement import LAST_FIRST, follows
 from app.store.results import ACTIVE
 from app.store.tables import (
     Calibration,
@@ -76,11 +77,10 @@ def counted(db: Session) -> Sequence[tuple[str, str, str, int]]:
 def found(
     db: Session, wanted: Mapping[str, Any], *, before: int | None = None, limit: int = 50
 ) -> Sequence[MeasuringSession]:
-    """Sessions whose gyro, stand and state are as wanted, the newest number first, below `before`."""
+    """Sessions whose gyro, stand and state are as wanted, the last one measured first, after that of `before`."""
     index = _indexed()
-    query = sa.select(index.c.id).where(*(index.c[key] == value for key, value in wanted.items()))
+    query = sa.select(MeasuringSession).join(index, index.c.id == MeasuringSession.id)
+    query = query.where(*(index.c[key] == value for key, value in wanted.items()))
     if before is not None:
-        query = query.where(index.c.id < before)
-    ids = db.scalars(query.order_by(index.c.id.desc()).limit(limit)).all()
-    rows = db.scalars(sa.select(MeasuringSession).where(MeasuringSession.id.in_(ids)))
-    return sorted(rows, key=lambda row: -row.id)
+        query = query.where(follows(before))
+    return db.scalars(query.order_by(*LAST_FIRST).limit(limit)).all()

@@ -130,6 +130,18 @@ def test_newest_first_in_parts(stand: httpx.Client) -> None:
     assert found == numbers[::-1]
 
 
+def test_the_last_one_measured_comes_first_whenever_it_was_entered(stand: httpx.Client) -> None:
+    days = [3, 9, 1, 9, 5]
+    for day in days:
+        opened(stand, started_at=f"2026-03-0{day}T12:00:00Z")
+    path, found = "/sessions?limit=2", []
+    while path:
+        part = stand.get(path.removeprefix("/api/v1")).json()
+        found += [(int(item["started_at"][8:10]), item["id"]) for item in part["items"]]
+        path = part["next"]
+    assert found == sorted(zip(days, range(1, 6), strict=True), reverse=True)
+
+
 @pytest.mark.parametrize(
     ("query", "days"),
     [

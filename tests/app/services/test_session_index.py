@@ -1,7 +1,7 @@
 """The index against what `sessions.views` says of each session, which is made another way."""
 
 from collections import Counter
-from datetime import date
+from datetime import UTC, date, datetime
 
 import pytest
 
@@ -92,6 +92,22 @@ def test_the_newest_come_first_and_pages_join(work):
     third = session_index.find(work, limit=2, before=int(second.next or 0)).page
     assert [item.id for page in (first, second, third) for item in page.items] == numbers[::-1]
     assert third.next is None
+
+
+def test_the_last_one_measured_comes_first_whenever_it_was_entered(work):
+    numbers = [opened(work) for _ in range(5)]
+    days = dict(zip(numbers, (3, 9, 1, 9, 5), strict=True))
+    for number, day in days.items():
+        sessions.find_session(work, number).started_at = datetime(2026, 3, day, tzinfo=UTC)
+    work.db.flush()
+    found, following = [], None
+    while True:
+        page = session_index.find(work, limit=2, before=following).page
+        found += [item.id for item in page.items]
+        if page.next is None:
+            break
+        following = int(page.next)
+    assert found == sorted(numbers, key=lambda number: (days[number], number), reverse=True)
 
 
 def test_nothing_there(work):
