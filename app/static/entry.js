@@ -1,4 +1,4 @@
-// The entry grid: Enter saves a row and goes to the next; a paste fills rows downwards and saves each.
+// The entry grid: Enter saves a row and goes to the next; a paste fills rows (`pasted.js` says which) and saves each.
 "use strict";
 
 (() => {
@@ -71,26 +71,33 @@
     if (x && x.value.trim() && y.value.trim()) save(row, false);
   });
 
+  // A paste is placed as a whole or not at all: what it says of itself counts more than where it was dropped.
+  const refused = document.getElementById("paste-refused");
+  const said = (result) => {
+    const text = JSON.parse(refused.dataset.say)[result.why];
+    return text.replace(/\{(\w+)\}/g, (_, name) => result[name]);
+  };
+  const plain = (name) => name.replace(/_(ua|ma)$/, "");
+  const described = (row) => ({
+    row, theta: Number(row.dataset.theta), psi: Number(row.dataset.psi), columns: inputs(row).map((input) => plain(input.name)),
+  });
   grid.addEventListener("paste", (event) => {
     const input = event.target.closest("input.in");
     const text = event.clipboardData && event.clipboardData.getData("text/plain");
     if (!input || !text || !/[\t\n;]/.test(text.trim())) return;
     event.preventDefault();
-    const lines = text.replace(/\r\n?/g, "\n").replace(/\n+$/, "").split("\n");
-    const apart = text.includes("\t") ? "\t" : text.includes(";") ? ";" : null;
-    const first = column(input);
-    let row = input.closest("tr");
-    for (const line of lines) {
-      if (!row) break;
-      const cells = apart ? line.split(apart) : [line];
-      const places = inputs(row);
-      cells.forEach((cell, index) => {
-        if (places[first + index]) places[first + index].value = cell.trim();
-      });
-      save(row, true);
-      row = step(row, 1);
+    const open = rows().filter((row) => inputs(row).length).map(described);
+    const start = open.findIndex(({ row }) => row === input.closest("tr"));
+    const result = Pasted.read(text, open, start, column(input), grid.dataset.unit);
+    refused.hidden = !result.why;
+    refused.querySelector("p").textContent = result.why ? said(result) : "";
+    if (result.why) return;
+    for (const { row: place, column: name, text: value } of result.found) {
+      inputs(place.row).find((item) => plain(item.name) === name).value = value;
     }
-    focus(row, first);
+    const touched = [...new Set(result.found.map(({ row: place }) => place.row))];
+    for (const row of touched) save(row, true);
+    focus(step(touched[touched.length - 1], 1), column(input));
   });
 
   // Begin where the address says, else in the first row that is still empty.
