@@ -3,7 +3,8 @@
 Every session has a gyro, a certificate and noise of its own. The stand truly stands where the
 certificate errs by its stated uncertainty: each position by itself and all together. Currents come
 from `simdevice`, which turns with scipy's `Rotation` and shares nothing with the solver's geometry.
-Each channel carries white noise and noise with a correlation time of 0.1 s.
+Each channel carries white noise and noise with a correlation time of 0.1 s; further sessions of the full study
+have 0.5 and 1 s, or state u(J) with 6, 10 and 20 degrees of freedom.
 
 The full study makes every record, 60 s at 200 Hz, and takes mean and uncertainty from it as a real
 session's. The quick one makes 640 records, takes from them how the stated uncertainty and its degrees
@@ -11,7 +12,7 @@ of freedom scatter, and draws the means: that of Gaussian noise is exactly Gauss
 the autocorrelation says, and independent of the scatter about it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -51,6 +52,9 @@ _FULL_RANGE: Final[Mapping[Method, tuple[float, float]]] = {
 _POSITIONS: Final = sixteen_positions()
 _SAMPLES, _RATE = 12_000, 200.0
 _CORRELATION_TIME: Final = 0.1
+_SLOWER: Final = (0.5, 1.0)
+_STATED_DOF: Final = (6.0, 10.0, 20.0)
+_SLOWER_RECORDS: Final = 320
 _CORRELATED_SHARE: Final = 0.3
 """Standard deviation of the correlated noise over that of the white noise."""
 _RECORDS: Final = 640
@@ -92,6 +96,7 @@ def group(progress: Progress, full: bool, seed: int) -> Group:
             held += _session(np.random.default_rng([seed, 2, number]), methods, None if full else stated[1:])
     except Exception as reason:  # told in the report: the other suites go on
         error = f"{type(reason).__name__}: {reason}"
+    further = _further(seed) if full else []  # half a minute, which the quick study does not have
     note = _FULL_NOTE if full else _QUICK_NOTE
     range_of_all = binomial_range(count, len(PARAMETERS))
     cases = [
@@ -105,7 +110,39 @@ def group(progress: Progress, full: bool, seed: int) -> Group:
         )
         for method, shares in zip(methods, held, strict=True)
     ]
-    return Group("coverage", _TITLE, (_of_means(stated), *cases))
+    return Group("coverage", _TITLE, (_of_means(stated), *cases, *further))
+
+
+def _further(seed: int) -> list[Case]:
+    """Least squares with slower noise, and with u(J) stated of few degrees of freedom."""
+    found: list[Case] = []
+    for number, (name, draw) in enumerate(_conditions(seed).items()):
+        error, held = "", np.zeros((1, len(PARAMETERS)))
+        try:
+            for session in range(QUICK):
+                rng = np.random.default_rng([seed, 3, number, session])
+                held += _session(rng, METHODS[:1], draw(rng))
+        except Exception as reason:  # told in the report: the others go on
+            error = f"{type(reason).__name__}: {reason}"
+        checks = () if error else _shares(held[0] / QUICK, binomial_range(QUICK, len(PARAMETERS)))
+        found.append(Case(name, _SOURCE, _FUNCTION, checks, _FURTHER_NOTE, error))
+    return found
+
+
+def _conditions(seed: int) -> Mapping[str, Callable[[np.random.Generator], Stated]]:
+    """Stated uncertainties of each kind of session, by its name."""
+
+    def slower(number: int) -> Callable[[np.random.Generator], Stated]:
+        rng = np.random.default_rng([seed, 4, number])
+        parts = [_from_records(rng, 32, _SLOWER[number]) for _ in range(_SLOWER_RECORDS // 32)]
+        _, u, dof = np.concatenate(parts, axis=1)
+        return lambda _rng: (u, dof)
+
+    def stated(dof: float) -> Callable[[np.random.Generator], Stated]:
+        return lambda rng: (np.sqrt(rng.chisquare(dof, _SLOWER_RECORDS) / dof), np.full(_SLOWER_RECORDS, dof))
+
+    draws = [slower(number) for number in range(len(_SLOWER))] + [stated(dof) for dof in _STATED_DOF]
+    return dict(zip(_FURTHER_NAMES, draws, strict=True))
 
 
 _TITLE: Final = marked("Coverage of 95 % intervals")
@@ -116,6 +153,17 @@ _NAMES: Final = {
     "generalised": marked("Parameters by generalised least squares"),
     "paper": marked("Parameters by the paper’s iteration"),
 }
+_FURTHER_NAMES: Final = (
+    marked("Least squares, noise correlated over 0.5 s"),
+    marked("Least squares, noise correlated over 1 s"),
+    marked("Least squares, u(J) of 6 degrees of freedom"),
+    marked("Least squares, u(J) of 10 degrees of freedom"),
+    marked("Least squares, u(J) of 20 degrees of freedom"),
+)
+_FURTHER_NOTE: Final = marked(
+    "400 sessions, means drawn with their true variance, u(J) as records of such noise or χ² of that many degrees of "
+    "freedom give it. The range is that of the eight shares together with probability 99.9 %."
+)
 _QUICK_NOTE: Final = marked(
     "400 sessions, means drawn with the variance that their autocorrelation says. The range is that of all "
     "shares of this method together with probability 99.9 % when each interval holds the truth with 95 %."
@@ -126,32 +174,32 @@ _FULL_NOTE: Final = marked(
 )
 
 
-def variance_of_mean() -> float:
+def variance_of_mean(time: float = _CORRELATION_TIME) -> float:
     """Variance of the mean of a record over that of its white noise's samples.
 
     Of n samples with autocorrelation φ^k: [(1 + φ)/(1 − φ) − 2φ(1 − φⁿ)/(n(1 − φ)²)]/n.
     """
-    n, phi = _SAMPLES, _memory()
+    n, phi = _SAMPLES, _memory(time)
     correlated = (1 + phi) / (1 - phi) - 2 * phi * (1 - phi**n) / (n * (1 - phi) ** 2)
     return (1.0 + _CORRELATED_SHARE**2 * correlated) / n
 
 
-def noise_records(rng: np.random.Generator, count: int) -> Array:
+def noise_records(rng: np.random.Generator, count: int, time: float = _CORRELATION_TIME) -> Array:
     """Records of noise, (count, 12,000); their means have the variance 1."""
     from scipy import signal  # slow to import, and only this study needs it
 
-    phi = _memory()
-    settled = round(10 * _CORRELATION_TIME * _RATE)
+    phi = _memory(time)
+    settled = round(10 * time * _RATE)
     shocks = rng.standard_normal((count, _SAMPLES + settled)) * (1 - phi**2) ** 0.5
     correlated = np.asarray(signal.lfilter([1.0], [1.0, -phi], shocks, axis=1))[:, settled:]
     correlated *= _CORRELATED_SHARE
     correlated += rng.standard_normal((count, _SAMPLES))
-    correlated /= variance_of_mean() ** 0.5
+    correlated /= variance_of_mean(time) ** 0.5
     return correlated
 
 
-def _memory() -> float:
-    return float(np.exp(-1.0 / (_CORRELATION_TIME * _RATE)))
+def _memory(time: float) -> float:
+    return float(np.exp(-1.0 / (time * _RATE)))
 
 
 def _stated_of_records(progress: Progress, seed: int) -> tuple[Array, Array, Array]:
@@ -165,9 +213,9 @@ def _stated_of_records(progress: Progress, seed: int) -> tuple[Array, Array, Arr
     return means, u, dof
 
 
-def _from_records(rng: np.random.Generator, count: int) -> Array:
+def _from_records(rng: np.random.Generator, count: int, time: float = _CORRELATION_TIME) -> Array:
     """Mean, its standard uncertainty and degrees of freedom of records, in units of the true u, (3, count)."""
-    found = [mean_with_uncertainty(record) for record in noise_records(rng, count)]
+    found = [mean_with_uncertainty(record) for record in noise_records(rng, count, time)]
     return np.array([(item.value, item.standard_uncertainty, item.dof) for item in found]).T
 
 

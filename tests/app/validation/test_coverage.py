@@ -55,6 +55,21 @@ def test_sessions_of_both_kinds_hold_the_truth_mostly(monkeypatch):
     assert 0.88 < np.sum(quick) / 720 <= 1.0
 
 
+def test_slow_noise_and_few_degrees_of_freedom_are_tried(monkeypatch):
+    monkeypatch.setattr(coverage, "QUICK", 12)
+    monkeypatch.setattr(coverage, "_SLOWER_RECORDS", 64)
+    dof = [np.median(draw(np.random.default_rng(1))[1]) for draw in coverage._conditions(5).values()]
+    assert dof[0] > dof[1] > 6.0  # slower noise: fewer cosines; never fewer than six
+    assert dof[2:] == [6.0, 10.0, 20.0]
+    cases = coverage._further(5)
+    assert [case.error for case in cases] == [""] * 5
+    held = [check.obtained for case in cases for check in case.checks]
+    assert len(held) == 40
+    assert (
+        0.85 < np.mean(held) <= 1.0
+    )  # 480 intervals, those of one session hang together: only a coarse bound
+
+
 def test_intervals_that_are_too_narrow_are_seen(monkeypatch):
     def narrow(observations, method, common):
         found = calibrate.calibrate(observations, method, common)
