@@ -31,10 +31,11 @@ from solver.blunders.explanations import INVISIBLE, Explanation, invisible, twin
 from solver.blunders.hypothesis_fit import Fitted
 from solver.blunders.hypothesis_score import Session
 from solver.blunders.prior import Prior
-from solver.blunders.suspicion import suspect
+from solver.blunders.suspicion import NOTICED, hidden, suspect
 from solver.blunders.verdicts import (
     cannot_exclude,
     differences,
+    errors_hidden,
     factor_text,
     far_from_prior,
     or_changed,
@@ -281,6 +282,9 @@ def _not_excluded(session: Session, explanations: list[Explanation]) -> tuple[Me
     factors = sorted(item.details["factor"] for item in near if item.code == "angle-unit")
     if factors:
         messages.append(small_angles(factors))
+    faint = hidden(session)
+    if faint:
+        messages.append(errors_hidden(session.observations, faint, NOTICED))
     pairs = twins(session)
     if pairs:
         messages.append(twins_alike(session.observations, pairs))

@@ -36,7 +36,8 @@ UNTOLD_RATIO: Final = 25.0
 """The same where no noise is stated (three times: a second blunder as large leaves half)."""
 DOUBT: Final = 1e-3
 """Probability of χ² below which the stated noise is no longer trusted for tests."""
-_LEAST_FREEDOM: Final = 3
+LEAST_FREEDOM: Final = 3
+"""Left over with a blunder taken out, to estimate the noise where it is not stated."""
 _ROUNDING: Final = 1e-10
 
 
@@ -281,7 +282,7 @@ class Session:
     def significant(self, score: Score) -> bool:
         """Whether good data would hardly ever look as much better under this hypothesis."""
         hypothesis = score.hypothesis
-        if hypothesis is None or self.comparable(score)[1].dof < (0 if self.told else _LEAST_FREEDOM):
+        if hypothesis is None or self.comparable(score)[1].dof < (0 if self.told else LEAST_FREEDOM):
             return False
         if not self.told and self.comparable(score)[0].variance <= self._rounding:
             return False

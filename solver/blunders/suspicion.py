@@ -14,13 +14,16 @@ from scipy import special
 
 from solver.blunders.hypotheses import courses
 from solver.blunders.hypothesis_fit import UNTOLD, Fitted
-from solver.blunders.hypothesis_score import LEVEL, Session
+from solver.blunders.hypothesis_score import LEAST_FREEDOM, LEVEL, Session
 from solver.constants import EARTH_RATE
 from solver.error_model import scale_matrix
 from solver.records import Array
 
 GROSS: Final = 2e-3 * EARTH_RATE
 """Scatter of the rates without stated noise that is worth a search, 0.03 °/h, rad/s."""
+NOTICED: Final = 30.0
+"""Errors of a single current that should show at the latest, in units of u."""
+_POWER: Final = 1.645
 _SINGULAR: Final = 1e-9
 _COURSES: Final = 5
 _WORST: Final = 3
@@ -52,6 +55,35 @@ def suspect(session: Session) -> Suspicion:
     return Suspicion(bool(overall or alarm or gross), worst)
 
 
+def hidden(session: Session) -> list[tuple[int, str]]:
+    """Measurements, (row, channel) with channel x, y or xy, of which an error of `NOTICED` u may not show.
+
+    An error of δ·u lowers the sum of squares by δ²·r once it is taken out, r the measurement's redundancy
+    (Baarda), and is noticed with a probability of 95 % where that is past the threshold by 1.6 deviations.
+    """
+    n = len(session.x)
+    chance, freedom = LEVEL / (2 * n), session.good.best.dof - 1
+    if freedom < (0 if session.told else LEAST_FREEDOM):
+        return [(row, "xy") for row in range(n)]
+    least = -special.ndtri(chance / 2) if session.told else -special.stdtrit(freedom, chance / 2)
+    faint = _redundancies(session).reshape(n, 2) < ((least + _POWER) / NOTICED) ** 2
+    return [
+        (int(row), "".join(np.array(["x", "y"])[faint[row]])) for row in np.flatnonzero(faint.any(axis=1))
+    ]
+
+
+def _redundancies(session: Session) -> Array:
+    """Part of each current's error, squared and over u, that stays in the residuals, (2n,)."""
+    fitted = session.good.fitted
+    if fitted is not None:
+        g, size = _redundancy(fitted)
+        return np.asarray(np.diagonal(g) * (session.u.ravel() ** 2 if session.told else 1.0 / size))
+    weighted = session.model.rows[:, None] * np.sqrt(session.model.weights)[..., None]
+    u, s, _ = np.linalg.svd(np.swapaxes(weighted, 0, 1), full_matrices=False)
+    spanned = np.sum(np.where(s > _SINGULAR * s[:, :1], 1.0, 0.0)[:, None] * u**2, axis=-1)
+    return np.asarray(1.0 - spanned.T).ravel()
+
+
 def _by_deletion(session: Session) -> Suspicion:
     """Where the scale factors do not show: the largest residuals of the currents."""
     size = np.abs(session.rest) * np.sqrt(session.model.weights)
@@ -64,11 +96,8 @@ def _by_deletion(session: Session) -> Suspicion:
 
 def _deletions(fitted: Fitted) -> tuple[Array, Array]:
     """Falls of the sum of squares without each current, (2n,), and without each position's both, (n,)."""
-    w, u = _dense(fitted.whitening), fitted.span
-    spanned = u.T @ w
-    g = w.T @ w - spanned.T @ spanned
-    b = w.T @ fitted.rest
-    size = np.einsum("ij,ij->j", w, w)
+    g, size = _redundancy(fitted)
+    b = _dense(fitted.whitening).T @ fitted.rest
     diagonal = np.diagonal(g)
     single = np.where(diagonal > _SINGULAR * size, b**2 / np.maximum(diagonal, _SINGULAR * size), 0.0)
     n = len(b) // 2
@@ -78,6 +107,13 @@ def _deletions(fitted: Fitted) -> tuple[Array, Array]:
     along = np.vecmat(b.reshape(n, 2), vectors) ** 2 / size.reshape(n, 2).mean(axis=1)[:, None]
     both = np.sum(np.where(values > _SINGULAR, along / np.maximum(values, _SINGULAR), 0.0), axis=1)
     return single, both
+
+
+def _redundancy(fitted: Fitted) -> tuple[Array, Array]:
+    """Wᵀ·S·W (2n, 2n), and the diagonal of Wᵀ·W."""
+    w = _dense(fitted.whitening)
+    spanned = fitted.span.T @ w
+    return w.T @ w - spanned.T @ spanned, np.einsum("ij,ij->j", w, w)
 
 
 def _drifts(session: Session, fitted: Fitted) -> list[float]:

@@ -23,9 +23,12 @@ def place(theta: float, psi: float, repeat: int = 0) -> str:
 def places(observations: Observations, rows: Sequence[int]) -> str:
     """Name the positions of some rows."""
     at = observations
-    named = [place(float(at.theta[r]), float(at.psi[r]), int(at.repeat[r])) for r in rows[:_MOST_NAMED]]
-    more = len(rows) - len(named)
-    return ", ".join(named) + (f", … (+{more})" if more > 0 else "")
+    return _shortened([place(float(at.theta[r]), float(at.psi[r]), int(at.repeat[r])) for r in rows], ", ")
+
+
+def _shortened(named: Sequence[str], between: str) -> str:
+    more = len(named) - _MOST_NAMED
+    return between.join(named[:_MOST_NAMED]) + (f"{between}… (+{more})" if more > 0 else "")
 
 
 def number(value: float) -> str:
@@ -286,14 +289,22 @@ def cannot_exclude(codes: Sequence[str], *, prior_given: bool) -> Message:
 def twins_alike(observations: Observations, pairs: Sequence[tuple[int, int]]) -> Message:
     """Positions that are the same in all but their misalignment."""
     named = [f"{places(observations, [one])} ↔ {places(observations, [other])}" for one, other in pairs]
-    shown = "; ".join(named[:_MOST_NAMED]) + (
-        f"; … (+{len(named) - _MOST_NAMED})" if len(named) > _MOST_NAMED else ""
-    )
     return Message(
         "positions-swapped",
         "An exchange of positions that differ by their misalignment alone would not show, nor change the result by "
         "much: %(pairs)s.",
-        {"pairs": shown},
+        {"pairs": _shortened(named, "; ")},
+    )
+
+
+def errors_hidden(observations: Observations, faint: Sequence[tuple[int, str]], noticed: float) -> Message:
+    """Measurements that the others hardly check."""
+    named = [f"{places(observations, [row])} ({channel})" for row, channel in faint]
+    return Message(
+        "errors-hidden",
+        "A wrong current might not show, even by %(noticed)g u, but spoil the result: %(positions)s. The other "
+        "positions hardly tell what it should be. Measure more positions, or these again.",
+        {"noticed": noticed, "positions": _shortened(named, ", ")},
     )
 
 

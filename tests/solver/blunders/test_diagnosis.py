@@ -303,6 +303,39 @@ def test_what_has_no_effect_is_not_listed(latitude, absent, rng):
     assert not absent & set(kinds(diagnosis).replace(",", "").split())
 
 
+def test_few_positions_say_where_an_error_would_not_show(rng):
+    """Of 30 u in each current of six positions: not told of, it is found with 95 %; told of, mostly not at all."""
+    positions = grid()[[0, 2, 5, 8, 10, 13]]
+    found, missed = [], []
+    for _ in range(5):
+        session = Study(positions=positions).draw(rng)
+        notes = {message.code: message.values for message in diagnose(good(session)[0]).not_excluded}
+        named = notes.get("errors-hidden", {"positions": ""})["positions"]
+        for row, channel in np.ndindex(6, 2):
+            currents = session.currents()
+            currents[row, channel] += 30 * session.u * rng.choice([-1, 1])
+            theta, psi = session.place(row)
+            there = f"θ {theta:g}° ψ {psi:g}° (xy)" in named
+            (missed if there else found).append(bool(diagnose(session.written(currents)).findings))
+    assert len(missed) >= 10  # which they are depends on the gyro: 0 to 4 of the twelve here
+    assert sum(missed) <= len(missed) / 2
+    assert sum(found) >= stats.binom.ppf(1e-4, len(found), 0.95)
+
+
+@pytest.mark.parametrize("u_given", [True, False])
+def test_five_positions_check_nothing_and_sixteen_everything(u_given, rng):
+    """300 u off at one of five positions leaves no trace, and that is said; sixteen check one another."""
+    session = Study(positions=grid()[[0, 1, 6, 11, 13]], u_given=u_given).draw(rng)
+    currents = session.currents()
+    currents[2, 0] += 300 * session.u
+    diagnosis = diagnose(session.written(currents))
+    assert not diagnosis.findings
+    told = [message for message in diagnosis.not_excluded if message.code == "errors-hidden"]
+    assert told[0].values["positions"].count("(xy)") == 5
+    whole = diagnose(good(Study(u_given=u_given).draw(rng))[0])
+    assert "errors-hidden" not in [message.code for message in whole.not_excluded]
+
+
 # Out of the ordinary
 
 
