@@ -74,11 +74,28 @@ class Seen:
     def mark(self) -> Mark:
         """The one word for how it stands."""
         run = self.run
+        if self.failed:
+            return Mark("out", gettext("Finished without a calibration"))
         if run.silent:
             return Mark("lost", gettext("No word from the station"))
         if run.phase in ("acquiring", "settling") and run.settled:
             return Mark("ok", gettext("Settled"))
         return phase(run)
+
+    @property
+    def refused(self) -> int:
+        """Records that the run refused for good."""
+        return sum(cell.state == "refused" for cell in self.run.cells)
+
+    @property
+    def suspicious(self) -> int:
+        """Records that a check objected to, and that are used all the same."""
+        return sum(cell.state == "suspicious" for cell in self.run.cells)
+
+    @property
+    def failed(self) -> bool:
+        """Whether the run came to its end and to no calibration."""
+        return self.run.phase == "finished" and bool(self.refused) and self.session.result is None
 
     @property
     def doing(self) -> str:

@@ -28,7 +28,7 @@ HERE = Spot(180.0, 180.0, 0, 0)
 
 def cells(running: int = 10, **others: str) -> tuple[CellState, ...]:
     """States of all sixteen: recorded up to the one that runs; `p3="skipped"` changes the third."""
-    states = ["recorded"] * running + ["running"] + ["todo"] * (15 - running)
+    states = (["recorded"] * running + ["running"] + ["todo"] * 15)[: len(GRID)]
     for name, state in others.items():
         states[int(name[1:]) - 1] = state
     return tuple(CellState(*place, 0, state) for place, state in zip(GRID, states, strict=True))
@@ -171,6 +171,32 @@ def test_a_run_that_has_ended_leads_on(
     assert "Every record is in, and the currents are solved." in text
     assert "sse-connect" not in text
     assert "http-equiv" not in text
+
+
+def test_a_run_whose_records_were_refused_is_not_complete(
+    technician: TestClient, stocked: Lab, opened: int, path: str
+) -> None:
+    ended = replace(START, phase="finished", position=None, waiting=0)
+    tell(
+        stocked, opened, replace(ended, cells=cells(running=16, p2="refused", p5="refused", p7="suspicious"))
+    )
+    text = words(technician.get(path).text)
+    assert "No calibration was asked for: 2 records were refused. The log names why of each." in text
+    assert "Finished without a calibration" in text
+    assert "1 record is suspicious: the log names why" in text
+    assert "Every record is in" not in text
+
+
+def test_a_result_without_refused_records_says_so(
+    technician: TestClient, stocked: Lab, measured: int, solving: Any
+) -> None:
+    solving(stocked, measured)
+    ended = replace(START, phase="finished", position=None, waiting=0)
+    tell(stocked, measured, replace(ended, cells=cells(running=16, p2="refused")))
+    text = words(technician.get(f"/sessions/{measured}/live").text)
+    assert "The currents are solved without 1 record that was refused." in text
+    assert "Every record is in" not in text
+    assert "Finished without" not in text
 
 
 def test_a_paused_run_is_resumed(technician: TestClient, stocked: Lab, opened: int, path: str) -> None:

@@ -18,6 +18,7 @@ from app.station.keeping.entries import (
     Judged,
     Opened,
     Planned,
+    Rejected,
     Resumed,
     Said,
     Started,
@@ -119,6 +120,14 @@ def test_what_became_of_each_position_is_shown(planned):
         "todo",
         "skipped",
     ]
+
+
+def test_a_record_that_the_service_refused_is_shown_as_refused(planned):
+    judged(planned, TARGETS[0], "accepted")
+    planned.add(Rejected(0, Said("refused", "No.", {})))
+    listener = Listener()
+    reported(planned, listener, 1)
+    assert listener.heard[0]["cells"][0]["state"] == "refused"
 
 
 def test_events_are_told_until_the_service_has_them(planned):
