@@ -226,7 +226,7 @@ def statistical(
 def _judged(days: float, times: Array) -> float:
     """The interval that findings judge: the one so far, if they count as found at its end, else their middle."""
     middle = float(np.median(times))
-    return days if COUNTS_FROM * days <= middle < days else middle
+    return days if COUNTS_FROM * days <= middle <= days / COUNTS_FROM else middle
 
 
 def _step(days: float, by: int) -> float:

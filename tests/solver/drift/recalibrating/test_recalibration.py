@@ -267,6 +267,8 @@ def test_findings_within_the_limits_speak_for_no_shorter_interval():
     """Findings of 300 days count as found after a year; of different lengths, they are too few for a model."""
     same = statistical(365, Findings([300] * 6, [0.5] * 6), None)
     assert (same.days, same.reason.code) == (365, "findings-stand")
+    late = statistical(90, Findings([98, 99, 98, 98, 97], [0.5] * 5), None)
+    assert (late.days, late.reason.values["days"]) == (90, 90)
     mixed = statistical(365, Findings([300, 300, 300, 600, 620, 330], [0.5] * 6), None)
     assert (mixed.days, mixed.reason.code) == (365, "findings-all-within")
     beyond = statistical(365, Findings([300, 300, 300, 600, 620, 330], [0.5] * 5 + [1.5]), None)
