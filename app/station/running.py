@@ -31,7 +31,6 @@ from app.station.sending.reporting import PATIENCE_S, Reporter
 from app.station.sending.service import Service
 from app.station.workplace import Patience, Workplace
 
-
 _SIMULATED: Final = "Driftbook,SIM-"
 
 
