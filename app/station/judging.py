@@ -11,6 +11,7 @@ from app.station.contracts import Currents, Place
 from app.station.judgement import checks, control, partners
 from app.station.judgement.checks import Take
 from app.station.judgement.expectations import Expectations, Thresholds
+from app.station.judgement.samples import limit_of_noise
 from app.station.judgement.settling import RestRule, RestWatch
 from app.station.keeping.entries import Finding, Said, Target, Verdict
 from app.station.keeping.history import History
@@ -92,15 +93,43 @@ class Rules:
     def findings(
         self, record: CurrentRecord, overload: bool, target: Target, history: History
     ) -> Sequence[Finding]:
-        """By itself, and beside the first record when it is the closing one."""
+        """By itself, beside the reading before it, and beside the first record when it is the closing one."""
         take = Take(record.t_s, record.jx_ma, record.jy_ma, overload)
         expected = self._expected(history)
         found = [
             _finding(item)
             for item in checks.judged(take, self.thresholds, expected, largest_ma=self.largest_ma)
         ]
+        found += self._beside_reading(take, history)
         if target.repeat and not any(item.verdict == "refused" for item in found):
             found += self._closing(record, target, history)
+        return found
+
+    def _beside_reading(self, take: Take, history: History) -> list[Finding]:
+        """Whether the record goes on from what the ammeter showed when it was begun.
+
+        A single reading has the noise of a sample, and may still have moved as far as a current at rest does in
+        one window. What is further off was read with another unit, or from another channel.
+        """
+        attempt = history.open_attempt
+        acquiring = attempt.acquiring if attempt is not None else None
+        if acquiring is None or acquiring.reading is None or take.overload:
+            return []
+        moved_ma = self.rest.limit_na_per_s * self.rest.window_s / _NA_PER_MA
+        found = []
+        for name, values, reading in zip(
+            ("Jx", "Jy"), (take.jx_ma, take.jy_ma), acquiring.reading, strict=True
+        ):
+            median = float(np.median(values))
+            if abs(median - reading) > limit_of_noise(values, self.thresholds.false_alarm / 2.0) + moved_ma:
+                message = Message(
+                    "reading",
+                    "%(channel)s is %(mean).4g mA in the record and was %(reading).4g mA in the reading just before. "
+                    "Compare units and order of channels of `reading` and `fetch` in the station's file; if they "
+                    "are right, measure again.",
+                    {"channel": name, "mean": median, "reading": reading},
+                )
+                found.append(Finding(Said.of(message), "refused"))
         return found
 
     def odd(

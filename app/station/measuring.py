@@ -57,8 +57,7 @@ def measure(at: Workplace, target: Target) -> None:
     with closing(at.spool.blocks(attempt.number)) as blocks:
         try:
             if attempt.acquiring is None:
-                approach(at, attempt)
-                _start(at, attempt)
+                _start(at, attempt, approach(at, attempt))
             else:
                 _take_up(at, attempt, blocks)
             overload = _collect(at, attempt, blocks)
@@ -102,14 +101,14 @@ def _begin(at: Workplace, target: Target) -> Attempt:
     return at.history.attempts[number]
 
 
-def approach(at: Workplace, attempt: Attempt) -> None:
-    """Go there and wait until the currents have settled; a further take goes away first, to index anew."""
+def approach(at: Workplace, attempt: Attempt) -> Currents:
+    """Go there and wait for settled currents, the last of them; a further take goes away first, to index anew."""
     target, take = attempt.target, attempt.started.take
     away = _away(at, target) if take else None
     if away is not None:
         go(at, away, target, take)
     go(at, target.place, target, take)
-    settle(at, target, take)
+    return settle(at, target, take)
 
 
 def _away(at: Workplace, target: Target) -> Place | None:
@@ -201,8 +200,8 @@ def _require_at(at: Workplace, status: StandStatus, place: Place) -> None:
         )
 
 
-def settle(at: Workplace, target: Target | None = None, take: int = 0) -> None:
-    """Wait until the measured currents keep still.
+def settle(at: Workplace, target: Target | None = None, take: int = 0) -> Currents:
+    """Wait until the measured currents keep still; the last ones.
 
     Raises
     ------
@@ -218,17 +217,17 @@ def settle(at: Workplace, target: Target | None = None, take: int = 0) -> None:
         settled = still.add(at.clock.lab_s(), currents)
         at.live.show(currents=currents, settled=settled is True)
         if settled:
-            return
+            return currents
         if deadline.passed:
             raise TakeFailed(_UNREST if settled is False else _UNSURE)
         at.wait()
 
 
-def _start(at: Workplace, attempt: Attempt) -> None:
+def _start(at: Workplace, attempt: Attempt, reading: Currents) -> None:
     begun = at.history.begun
     assert begun is not None
     label = 1 << 30 | (zlib.crc32(begun.run.encode()) & 0xFFFFF) << 10 | (attempt.number & 0x3FF)
-    at.spool.add(Acquiring(attempt.number, label, at.clock.now()))
+    at.spool.add(Acquiring(attempt.number, label, at.clock.now(), reading))
     at.ammeter.start(label, attempt.started.take, begun.samples, begun.rate_hz)
 
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Literal, NamedTuple, Self
 
 from pydantic import Field, TypeAdapter
 
-from app.station.contracts import Place
+from app.station.contracts import Currents, Place
 from solver.errors import Message
 
 Verdict = Literal["accepted", "suspicious", "refused"]
@@ -142,11 +142,15 @@ class Started:
 
 @dataclass(frozen=True, slots=True)
 class Acquiring:
-    """The ammeter is about to be told to acquire; `label` is how it will be known again."""
+    """The ammeter is about to be told to acquire; `label` is how it will be known again.
+
+    `reading` is what it showed just before, which the record must go on from.
+    """
 
     attempt: int
     label: int
     started_at: datetime
+    reading: Currents | None = None
     kind: Literal["acquiring"] = "acquiring"
 
 

@@ -1,12 +1,16 @@
 """The judge by rules: what it makes of a laboratory's thresholds, a type's expectations and a run's history."""
 
+from datetime import UTC, datetime
+
 import numpy as np
 import pytest
 
+from app.exchange.rows import CurrentRecord
 from app.station.contracts import Currents, Place
 from app.station.instruments.description import SIMULATED, station_file
 from app.station.judging import Rules
-from app.station.keeping.history import History
+from app.station.keeping.entries import Acquiring, Started, Target
+from app.station.keeping.history import Attempt, History
 
 FILE = station_file(SIMULATED)
 RULES = Rules(FILE.settling, FILE.warm_up, FILE.checks, FILE.types, FILE.ammeter.largest_ma)
@@ -46,3 +50,24 @@ def test_currents_that_nobody_can_tell_of_are_not_said_to_creep(noise_na, creep_
     for number, (x, y) in enumerate(noise + creep_na_per_s * 10.0 * np.arange(481)[:, None]):
         told = watch.add(10.0 * number, Currents(x * 1e-6, y * 1e-6))
     assert told is still
+
+
+def test_a_record_that_does_not_go_on_from_the_reading_before_it_is_refused():
+    """Samples scatter by 123 nA; a reading further off than 0.9 µA, at 7 standard deviations, is none of theirs."""
+    rng = np.random.default_rng(1)
+    t_s = np.arange(12000) / 200.0
+    jx_ma, jy_ma = np.array([[0.004], [-0.002]]) + 123e-6 * rng.standard_normal((2, 12000))
+    record = CurrentRecord(0.0, 0.0, t_s, jx_ma, jy_ma)
+
+    def codes(*reading: float) -> list[tuple[str, object]]:
+        started = Started(0, Target(0.0, 0.0), 0)
+        attempt = Attempt(started, Acquiring(0, 1, datetime(2026, 3, 1, tzinfo=UTC), Currents(*reading)))
+        history = History(gyro_type="GVK-6", attempts=[attempt])
+        found = RULES.findings(record, False, started.target, history)
+        assert {item.verdict for item in found} <= {"refused"}
+        return [(item.said.code, item.said.values["channel"]) for item in found]
+
+    assert codes(0.0045, -0.0024) == []
+    assert codes(4.0, -2.0) == [("reading", "Jx"), ("reading", "Jy")]  # A taken for mA
+    assert codes(-0.002, 0.004) == [("reading", "Jx"), ("reading", "Jy")]  # exchanged
+    assert codes(0.004, -0.0035) == [("reading", "Jy")]
