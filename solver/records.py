@@ -212,7 +212,7 @@ class Estimate:
         NaN in the rows and columns of undetermined parameters, and everywhere when
         `uncertainty_basis` is ``none``.
     uncertainty_basis
-        ``given``: from u(J) as stated; ``scatter``: from the residuals' scatter; ``none``: neither
+        ``given``: from u(J) (`solver.current_noise`); ``scatter``: from the residuals' scatter; ``none``: neither
         is possible (no degree of freedom left, or the scale factors, by which the currents' noise
         becomes that of the rates, are not determined).
     residuals : (n, 2) array

@@ -10,7 +10,8 @@ a current's error on the parameters (`solver.inputs.by_currents`)::
 which counting û_i²·(1 + 4·r_i/ν_i) in the place of û_i² makes good. r_i is what the fit leaves of a unit error
 in a whitened current: 1 minus its leverage. For a weighted mean that is Meier's correction (P. Meier, Biometrics 9,
 1953, 59), for V⁻¹ as weights that of M. G. Kenward and J. H. Roger (Biometrics 53, 1997, 983). It
-does not change the weights themselves, nor χ².
+does not change the weights themselves, nor χ². A channel whose û are all one, pooled or stated so, has no
+such weights: nothing is added.
 """
 
 from dataclasses import replace
@@ -45,7 +46,7 @@ def widening_of(equations: Equations, values: Array, gain: Array, whitening: Arr
     else:
         columns, left = whiten(whitening, columns), whiten(whitening, left)
     remaining = np.maximum(np.einsum("ij,ij->j", columns, left), 0.0).reshape(u.shape)
-    return np.asarray(np.sqrt(1.0 + 4.0 * remaining / dof))
+    return np.asarray(np.sqrt(1.0 + np.where(np.ptp(u, axis=0) > 0.0, 4.0 * remaining / dof, 0.0)))
 
 
 def widened(noise: Noise, equations: Equations, values: Array, widening: Array | None) -> Noise:
@@ -83,5 +84,6 @@ def widened_block(
     whitened = whole.reshape(count, rows, 8)
     gain = whitened @ covariance.transpose(2, 0, 1)
     remaining = np.maximum(1.0 - np.einsum("bmi,bmi->bm", whitened, gain), 0.0).reshape(count, -1, 2)
-    factor = (4.0 * remaining / freedom).reshape(count, rows, 1)
+    differ = np.ptp(scale, axis=1, keepdims=True) > 0.0
+    factor = np.where(differ, 4.0 * remaining / freedom, 0.0).reshape(count, rows, 1)
     return np.asarray(covariance + (gain.swapaxes(1, 2) @ (factor * gain)).transpose(1, 2, 0))

@@ -180,3 +180,14 @@ def test_good_sessions_with_estimated_u_raise_no_alarm(rng):
         dof = np.full(POSITIONS, 4.0)
         found += bool(diagnose(replace(at, u_jx=u[0], u_jy=u[1], dof_jx=dof, dof_jy=dof)).findings)
     assert found <= stats.binom.ppf(0.999, count, 0.01), found
+
+
+def test_one_u_for_all_positions_changes_nothing_but_its_degrees_of_freedom(rng):
+    """It is one estimate, and its weights are equal whatever it is: the covariance is that of a known u."""
+    at = Setup(noise=0.005, u_given=True).observe(rng)
+    few = np.full(POSITIONS, 6.0)
+    known, estimate = (
+        calibrate(one, "least-squares").least_squares for one in (at, replace(at, dof_jx=few, dof_jy=few))
+    )
+    assert np.array_equal(known.values, estimate.values)
+    assert np.array_equal(known.covariance, estimate.covariance)

@@ -224,10 +224,6 @@ def test_a_moderated_uncertainty_is_told_as_stated_and_as_used():
     np.testing.assert_allclose(noise["x"]["u_used_ma"], np.sqrt(np.mean(u_ma**2)), rtol=1e-12)
     np.testing.assert_allclose(noise["y"]["u_used_ma"], 2 * np.sqrt(np.mean(u_ma**2)), rtol=1e-12)
     np.testing.assert_allclose(noise["x"]["dof_used"], 80.0, rtol=1e-12)
-    # what estimated weights add: 4·(1 − leverage)/ν, leverages of 16 currents summing to 8
-    added = [(np.array(noise[axis]["u_counted_ma"]) / noise[axis]["u_used_ma"]) ** 2 - 1 for axis in "xy"]
-    assert np.sum(added) == pytest.approx(
-        4 * (16 - 8) / 80.0, rel=0.01
-    )  # K moves a little between the rounds of weighting
+    assert noise["x"]["u_counted_ma"] == noise["x"]["u_used_ma"]  # equal weights: nothing to allow for
     assert "used 2.01e-06 mA with ν 80" in noise["conclusion"]["message"]
     assert "current_noise" not in result(None)
