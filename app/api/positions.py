@@ -1,5 +1,6 @@
 """One position of a session: its means, or its record of currents."""
 
+from dataclasses import replace
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Path, Query, Request, Response
@@ -8,7 +9,7 @@ from app.api import bodies
 from app.api.auth import Reader, Uploader
 from app.api.bodies import FILE_TYPES, StreamedBody, body_of
 from app.api.pagination import CSV_TOO, Listing, wants_csv
-from app.api.schemas.common import Id, Incoming, Name, PathAngle
+from app.api.schemas.common import Id, Incoming, Name, PathAngle, Text
 from app.api.schemas.measuring import MeasuredRecord, Measurement, NewMeans, Position, Repeat
 from app.api.schemas.noise import PositionNoise, position_noise
 from app.api.schemas.warned import warned
@@ -33,6 +34,7 @@ class Naming(Which):
     """What a record's bytes do not say."""
 
     filename: Name | None = None
+    note: Text = ""
 
 
 def _saved(model: Any) -> dict[int | str, dict[str, Any]]:
@@ -97,7 +99,7 @@ def put_currents(
         caller.lab.files, body, name, theta_deg, psi_deg, naming.repeat
     )
     with caller.write() as work:
-        saved = ingest.save(work, session_id, [measured])[0]
+        saved = ingest.save(work, session_id, [replace(measured, note=naming.note)])[0]
     response.status_code = 201 if saved.new else 200
     shown = Measurement.model_validate(saved.measurement)
     return MeasuredRecord.model_validate(dict(shown) | {"warnings": warned(warnings)})

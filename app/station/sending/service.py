@@ -4,12 +4,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Final, Self
 
 from app.station.contracts import Certified, Place
 from app.station.keeping.entries import Begun
 from app.station.keeping.history import Attempt
 from app.station.sending.client import asked, connected, currents_request
+
+_LONGEST_NOTE: Final = 1000
 
 
 class Service:
@@ -37,9 +39,14 @@ class Service:
         return tuple(Certified(*item) for item in found.items()), str(said["type"])
 
     def put_record(self, session: int, attempt: Attempt, content: bytes) -> None:
-        """Bring a record; the same bytes again change nothing. An answer that does not name it is none."""
+        """Bring a record, and what the checks said of it; the same again changes nothing.
+
+        An answer that does not name it is none.
+        """
         path, params = currents_request(session, *attempt.target)
-        asked(self._client, "PUT", path, "record_sha256", params=params, content=content)
+        note = _objections(attempt)
+        said = params | ({"note": note} if note else {})
+        asked(self._client, "PUT", path, "record_sha256", params=said, content=content)
 
     def calibrate(self, session: int, method: str) -> str:
         """Ask for the calibration; give the job."""
@@ -81,3 +88,10 @@ class Service:
 def _turned(angles: Mapping[str, float]) -> float:
     """√(α² + β² + γ²), arcsec."""
     return math.hypot(angles["alpha_arcsec"], angles["beta_arcsec"], angles["gamma_arcsec"])
+
+
+def _objections(attempt: Attempt) -> str:
+    """What the checks said of a take that is sent all the same; nothing when they are content with it."""
+    findings = attempt.judged.findings if attempt.judged is not None else ()
+    said = dict.fromkeys(finding.said.text for finding in findings)
+    return f"suspicious: {' '.join(said)}"[:_LONGEST_NOTE] if said else ""

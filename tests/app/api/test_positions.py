@@ -204,3 +204,12 @@ def test_no_noise_without_a_record(stand: httpx.Client, session_id: int) -> None
     typed = stand.get(place(session_id, "noise"))
     assert (typed.status_code, typed.json()["errors"][0]["code"]) == (404, "no-record")
     assert stand.get(place(999_999, "noise")).status_code == 404
+
+
+def test_a_records_note_stands_with_its_measurement(
+    stand: httpx.Client, session_id: int, record_parquet: bytes
+) -> None:
+    path, said = place(session_id, "currents"), {"note": "suspicious: Jx scatters."}
+    first = stand.put(path, params=said, content=record_parquet, headers=PARQUET)
+    assert (first.status_code, first.json()["note"]) == (201, said["note"])
+    assert stand.put(path, params=said, content=record_parquet, headers=PARQUET).status_code == 200

@@ -4,8 +4,11 @@ import httpx
 import pytest
 
 from app.errors import Invalid
+from app.station.keeping.entries import Finding, Judged, Said, Started, Target
+from app.station.keeping.history import Attempt
 from app.station.sending import client
 from app.station.sending.client import ServerRefused, Unreachable, asked, connected, followed, send, send_once
+from app.station.sending.service import Service
 
 PROXY = httpx.Response(200, html="<p>Please sign in to the network.</p>")
 
@@ -105,3 +108,20 @@ def test_a_job_is_followed_to_its_result(pauses):
 def test_a_job_without_a_result_says_why(error, why):
     with answering(PROXY) as http, pytest.raises(ServerRefused, match=f"gave no result: {why}"):
         followed(http, {"id": "j", "state": "cancelled", "error": error})
+
+
+def test_a_record_is_brought_with_what_the_checks_said_of_it():
+    sent = []
+
+    def answer(request: httpx.Request) -> httpx.Response:
+        sent.append(dict(request.url.params))
+        return httpx.Response(201, json={"record_sha256": "0"})
+
+    service = Service("http://lab", "token")
+    service._client = httpx.Client(base_url="http://lab/api/v1", transport=httpx.MockTransport(answer))
+    noise = Finding(Said("noise", "Jx scatters by %(noise)d nA.", {"noise": 300}), "suspicious")
+    for findings in ((), (noise, noise)):
+        started = Started(0, Target(0.0, 90.0), 0)
+        service.put_record(5, Attempt(started, judged=Judged(0, "accepted", findings)), b"")
+    service.close()
+    assert [params.get("note") for params in sent] == [None, "suspicious: Jx scatters by 300 nA."]
