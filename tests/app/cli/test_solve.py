@@ -136,6 +136,10 @@ def test_the_table_for_people_has_values_with_u_and_says_what_u_covers(driftbook
     assert done.code == 0
     assert "least-squares" in done.out
     assert "it comes mostly from noise of the mean currents" in " ".join(done.out.split())
+    # of records: each u(J) was estimated with some 50 degrees of freedom
+    assert "each is moderated by the other positions of its channel. u(Jx): stated" in " ".join(
+        done.out.split()
+    )
 
 
 def test_the_command_line_wins_over_the_sessions_files_and_says_so(driftbook, tmp_path):

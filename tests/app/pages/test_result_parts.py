@@ -131,3 +131,14 @@ def test_kinds_that_cannot_be_excluded_are_named_in_words():
     item = {"code": "not-excluded", "message": "Not: latitude-sign.", "template": "Not: %(kinds)s.",
             "values": {"kinds": "latitude-sign, psi-reversed"}}  # fmt: skip
     assert not_excluded({"not_excluded": [item]}) == ["Not: sign of the latitude, ψ counted the other way."]
+
+
+def test_a_moderated_uncertainty_of_the_currents_is_said():
+    conclusion = {
+        "code": "moderated-uncertainty",
+        "message": "stated 1…3 mA",
+        "template": "stated %(stated_x)s mA",
+        "values": {"stated_x": "1…3"},
+    }
+    assert Budget({"current_noise": {"conclusion": conclusion}}).moderation == "stated 1…3 mA"
+    assert Budget({}).moderation == ""
