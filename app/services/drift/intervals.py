@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.exchange.json_values import Json
+from app.exchange.json_values import Json, message_from
 from app.exchange.si import PARAMETER_UNITS
 from app.services.drift.courses import DAY, HORIZON
 from app.services.drift.series import Column, SeriesTable, moment, seconds
@@ -207,9 +207,7 @@ def _reason(message: Message) -> Json:
 
 def _read(item: Json) -> MethodAdvice:
     """What `_advice` wrote."""
-    told = item["reason"]
-    reason = Message(told["code"], told["template"], told["values"])
-    return MethodAdvice(item["method"], item["days"], reason, item["interval_of"])
+    return MethodAdvice(item["method"], item["days"], message_from(item["reason"]), item["interval_of"])
 
 
 def _advice(item: MethodAdvice) -> dict[str, Any]:

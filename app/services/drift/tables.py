@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Final
 
+from app.exchange.json_values import message_from
 from app.exchange.si import PARAMETER_UNITS
 from app.exchange.written import Cell
 from app.services.drift.fleet_rows import field
 from app.services.drift.fleet_views import Distribution, Fleet
-from solver.errors import Message
 from solver.records import PARAMETERS
 
 Document = Mapping[str, Any]
@@ -116,7 +116,8 @@ def intervals(document: Document) -> Table:
             {"method": "recommended", "days": found["recommended_days"], "interval_of": "recalibration",
              "reason": found["reason"]}
         )  # fmt: skip
-    return _table(_INTERVAL, (_picked(item, _INTERVAL) | {"reason": _said(item["reason"])} for item in told))
+    said = (_picked(item, _INTERVAL) | {"reason": message_from(item["reason"]).text} for item in told)
+    return _table(_INTERVAL, said)
 
 
 def findings(document: Document) -> Table:
@@ -180,7 +181,3 @@ def _cell(name: str, value: Any) -> Cell:
 
 def _dates(dates: Sequence[Document]) -> str:
     return " ".join(f"{item['session']}:{item['probability']:.4g}" for item in dates)
-
-
-def _said(reason: Document) -> str:
-    return Message(reason["code"], reason["template"], reason["values"]).text
