@@ -25,7 +25,7 @@ _CENTRE, _SCALE = Fraction(-6), Fraction(3)
 _CENTRED_DIGITS: Final = 10.0
 _FILIP_NOTE: Final = marked(
     "Powers of x as they stand, columns scaled: condition 5·10⁹. The rounding of the factorisation, which differs "
-    "between processors, leaves about seven digits; six are required here, and ten of the centred form below."
+    "between processors, leaves seven digits and a bit: seven are required here, ten of the centred form below."
 )
 _CENTRED_NOTE: Final = marked(
     "The same polynomial in powers of (x + 6)/3, condition 1.6·10³, its coefficients and their covariance "
