@@ -106,8 +106,20 @@ def _limits(answer: Mapping[str, Any]) -> Iterator[str]:
         yield answer["current_noise"]["conclusion"]["message"]
     if answer.get("monte_carlo"):
         yield f"Monte Carlo: {answer['monte_carlo']['conclusion']['message']}"
+        if answer["monte_carlo"]["verdict"] == "disagree":
+            yield from _drawn(answer["monte_carlo"])
     if answer.get("model"):
         yield answer["model"]["conclusion"]["message"]
+
+
+def _drawn(found: Mapping[str, Any]) -> Iterator[str]:
+    """The Monte Carlo intervals, which hold where first order's U does not."""
+    for name, entry in found["parameters"].items():
+        low, high = entry["symmetric"]
+        decimals = decimals_of(entry["tolerance"])
+        if low is not None and decimals is not None:
+            ends = (rounded(end, decimals).replace("-", "−") for end in (low, high))
+            yield f"  {name}: {100 * found['level']:g} % within {' … '.join(ends)} {_unit(name)}"
 
 
 def _findings(answer: Mapping[str, Any]) -> Iterator[str]:

@@ -7,11 +7,15 @@ The ends of the GUM's interval y ± U are held against those of the Monte Carlo 
 Both within the numerical tolerance δ of u(y), 7.9.2: first order is validated for this output. But the
 Monte Carlo ends scatter themselves (8.2 asks for a run whose own tolerance is δ/5). So the
 verdict stays open where they are not known to δ, two standard errors, or lie beyond δ by less than that.
+
+First order takes an input of ν degrees of freedom by its u, Monte Carlo by its t-distribution, whose standard deviation
+is u·√(ν/(ν − 2)) (JCGM 101, 6.4.9). Where these alone give the draws their standard deviation, and their mean is the
+estimate, that is the cause and no non-linearity.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +24,7 @@ from solver.errors import Message
 from solver.propagation.monte_carlo import MonteCarlo, numerical_tolerance
 from solver.records import Array
 
+_NEAR: Final = 0.05
 Verdict = Literal["agree", "disagree", "open"]
 
 
@@ -61,6 +66,7 @@ def compare(
     digits: int = 2,
     unit: ArrayLike = 1.0,
     names: Sequence[str],
+    by_t: Array | None = None,
 ) -> Comparison:
     """Hold first order against Monte Carlo.
 
@@ -74,6 +80,8 @@ def compare(
         Significant digits of u that matter, and the unit of each output in which they are counted.
     names : (p,)
         Of the outputs, for the words.
+    by_t : (p,) array, optional
+        `u` with the standard deviations of the inputs' t-distributions in place of their u.
     """
     tolerance = numerical_tolerance(u, digits, unit)
     apart = np.abs(np.stack((values - expanded, values + expanded), axis=1) - found.symmetric)
@@ -86,6 +94,7 @@ def compare(
     told = ", ".join(np.array(names, dtype=object)[here])
     with np.errstate(divide="ignore", invalid="ignore"):
         worst = float(np.max(np.nan_to_num(apart / allowed)))
+    few = by_t is not None and bool(_by_few(found, values, u, by_t)[here].all())
     return Comparison(
         tolerance=tolerance,
         low=apart[:, 0],
@@ -93,17 +102,35 @@ def compare(
         within=np.asarray(within),
         open=np.asarray(unsure),
         verdict=verdict,
-        message=_words(verdict, told, worst, digits, 100 * found.level, found.trials),
+        message=_words(verdict, told, worst, digits, 100 * found.level, found.trials, few=few),
     )
 
 
-def _words(verdict: Verdict, names: str, worst: float, digits: int, percent: float, trials: int) -> Message:
+def _by_few(found: MonteCarlo, values: Array, u: Array, by_t: Array) -> NDArray[np.bool_]:
+    """Where the draws are as wide as few degrees of freedom make them, and not moved, (p,)."""
+    drawn = found.standard_uncertainties
+    as_wide = np.abs(drawn - by_t) < np.minimum(_NEAR * u, (by_t - u) / 2)
+    return np.asarray(as_wide & (np.abs(found.mean - values) < _NEAR * u))
+
+
+def _words(
+    verdict: Verdict, names: str, worst: float, digits: int, percent: float, trials: int, *, few: bool
+) -> Message:
     common = {"digits": digits, "level": percent, "trials": trials, "worst": worst, "names": names}
     if verdict == "agree":
         return Message(
             "first-order-confirmed",
             "First-order propagation (GUM) and Monte Carlo agree: the ends of every %(level)g %% interval are "
             "the same within the tolerance of JCGM 101 (8.1; significant digits of u: %(digits)d).",
+            common,
+        )
+    if verdict == "disagree" and few:
+        return Message(
+            "first-order-refuted",
+            "First-order propagation (GUM) and Monte Carlo disagree for %(names)s: the ends of the %(level)g %% "
+            "intervals differ by up to %(worst).3g times the tolerance of JCGM 101 (8.1; significant digits of u: "
+            "%(digits)d). The cause is that standard uncertainties were estimated with few degrees of freedom: their "
+            "t-distributions are wider than u. There is no sign of non-linearity. Use the Monte Carlo intervals.",
             common,
         )
     if verdict == "disagree":

@@ -8,6 +8,8 @@ For the robust method these are Huber's, with the inputs' uncertainty widened as
 """
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -16,7 +18,7 @@ from solver.errors import InputError, Message
 from solver.estimators.conclusion import Solved
 from solver.estimators.rate_noise import root_inverse, whitening_of
 from solver.estimators.robust import position_whitening
-from solver.propagation.budget import Budget
+from solver.propagation.budget import Budget, make_budget
 from solver.propagation.comparison import Comparison, compare
 from solver.propagation.draw_solutions import SessionModel, session_model
 from solver.propagation.monte_carlo import MOST_TRIALS, TRIALS, MonteCarlo, run
@@ -28,6 +30,7 @@ DISPLAY_UNITS: Array = np.array(
     [float(scale_from_deg_per_h_per_ma(1.0))] * 4 + [float(rad_per_s_from_deg_per_h(1.0))] * 4
 )
 """Units in which the digits of u are counted, °/h/mA and °/h, SI."""
+_NO_VARIANCE: Final = 1e-12
 
 
 def propagate_distributions(
@@ -71,7 +74,22 @@ def compare_with_budget(solved: Solved, budget: Budget, found: MonteCarlo, *, di
         digits=digits,
         unit=DISPLAY_UNITS,
         names=PARAMETERS,
+        by_t=_by_t(solved),
     )
+
+
+def _by_t(solved: Solved) -> Array:
+    """First order's u with the standard deviations of the inputs' t-distributions, (8,)."""
+    at = solved.linearise()
+    wider = _wider(at.inputs.dof)
+    inputs = replace(at.inputs, covariance=at.inputs.covariance * np.outer(wider, wider))
+    scatter = None if at.scatter is None else at.scatter * _wider(np.array([at.scatter_dof])) ** 2
+    return make_budget(at.gain, inputs, scatter=scatter, scatter_dof=at.scatter_dof).standard_uncertainties
+
+
+def _wider(dof: Array) -> Array:
+    """√(ν/(ν − 2)), next to infinite from two degrees of freedom down."""
+    return np.asarray(1.0 / np.sqrt(np.maximum(1.0 - 2.0 / dof, _NO_VARIANCE)))
 
 
 def model_of(solved: Solved) -> SessionModel:

@@ -235,3 +235,20 @@ def test_the_table_tells_of_the_diagnosis_and_the_draws(driftbook, case):
                      "--latitude", LATITUDE_DEG, "--prior", case / "prior.json", "--monte-carlo", 10_000)  # fmt: skip
     assert "diagnosis 1:" in done.out
     assert "Monte Carlo:" in done.out
+
+
+def test_where_the_draws_refute_u_their_intervals_are_printed(driftbook, case):
+    """A base known to 60 000″: large rotations shorten the components, which first order does not know."""
+    stated = {"u_level_1_arcsec": 10_000, "u_azimuth_arcsec": 60_000}
+    (case / "u.json").write_text(json.dumps(stated))
+    asked = ("--uncertainties", case / "u.json", "--monte-carlo", 10_000)
+    found = solve(driftbook, case, *asked)["monte_carlo"]
+    assert found["verdict"] == "disagree"
+    done = driftbook("solve", case / "currents.csv", "--certificate", case / "certificate.csv",
+                     "--latitude", LATITUDE_DEG, *asked)  # fmt: skip
+    (line,) = [line for line in done.out.splitlines() if line.strip().startswith("kx: 95 % within")]
+    low, high = line.split("within ")[1].removesuffix(" °/h/mA").split(" … ")
+    tolerance = found["parameters"]["kx"]["tolerance"]
+    assert [float(low), float(high)] == pytest.approx(
+        found["parameters"]["kx"]["symmetric"], abs=2 * tolerance
+    )

@@ -146,6 +146,21 @@ def test_where_first_order_fails_the_comparison_says_so(rng, circumstances, stan
     assert all(name in PARAMETERS for name in judged.message.values["names"].split(", "))
     bias = (found.mean - solved.values) / found.standard_uncertainties
     assert np.abs(bias).max() > 0.05  # first order knows no bias; sampling would give 0.0045
+    assert "degrees of freedom" not in judged.message.text
+
+
+@pytest.mark.parametrize("method", [least_squares, generalised])
+def test_few_degrees_of_freedom_are_named_as_the_cause(rng, method):
+    """What is in common, of ν = 6 each: the deviation of a t-distribution is √(6/4) u, and the draws' with it."""
+    standard = {
+        name: LARGE_COMMON[name] for name in ("level_1", "level_2", "azimuth", "gain_x", "gain_y", "gravity")
+    }
+    common = CommonUncertainty.of(standard, dof=dict.fromkeys(standard, 6.0))
+    solved = solve_by(method, session(rng, 0.0), common)
+    found = propagate_distributions(solved, trials=50_000, seed=1)
+    judged = compare_with_budget(solved, budget_of(solved), found, digits=2)
+    assert judged.verdict == "disagree"
+    assert "degrees of freedom" in judged.message.text
 
 
 def test_noise_in_the_design_pulls_the_scale_factors_by_the_known_amount(rng):
