@@ -49,7 +49,7 @@ def _head(plan: Plan) -> str:
         )
     search = plan.search
     how = (
-        f"best of {search.tried} sets, every one tried"
+        f"best of {search.tried} sets, every one tried, those that bury the scale factors in noise last"
         if search.exhaustive
         else (f"best of {search.starts} exchanges, {search.tried} sets tried")
     )

@@ -77,7 +77,9 @@ class Search(Outgoing):
     figure: float | None = Field(description="What the criterion makes of them, in `unit`.")
     unit: str
     candidates: int
-    exhaustive: bool = Field(description="Every set was tried, so none is better.")
+    exhaustive: bool = Field(
+        description="Every set was tried, so none is better but those that bury the scale factors in noise."
+    )
     starts: int
     tried: int
 

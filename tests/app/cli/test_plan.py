@@ -64,7 +64,10 @@ def test_a_list_that_leaves_something_open_says_so_in_words(plan, tmp_path):
 
 def test_tables_of_what_is_compared(plan):
     done = plan("--counts", "--trade", "--count", 6, "--grid", 90)
-    assert "best of 8008 sets, every one tried" in " ".join(done.out.split())  # 16 over 6
+    told = " ".join(done.out.split())
+    assert (
+        "best of 8008 sets, every one tried, those that bury the scale factors in noise last" in told
+    )  # 16 over 6
     assert "How many positions are worth it" in done.out
     assert "the paper's eight" in done.out
 
