@@ -204,7 +204,9 @@ def _drawn(
         "cusum_above": sums.up, "cusum_below": sums.down, "cusum_high": sums.decision,
     }  # fmt: skip
     for name, column in drawn.items():
-        columns[f"{parameter}.{name}"][places] = np.broadcast_to(np.asarray(column), len(history))[means.member]
+        columns[f"{parameter}.{name}"][places] = np.broadcast_to(np.asarray(column), len(history))[
+            means.member
+        ]
     for found, chosen in (
         (single.violations, True), (average.violations, "ewma" in view.rules), (sums.violations, "cusum" in view.rules),
     ):  # fmt: skip

@@ -130,4 +130,6 @@ def test_through_the_database(lab: Lab) -> None:
         work.now = BEGIN + timedelta(days=400)
         events.add(work, "moved", alarm.at, stand="S1")
         studying.follow_all_now(work)
-        assert [item.id for item in alarms.alarms(work, stand="S1")] == [alarm.id]  # it still wants its answer
+        assert [item.id for item in alarms.alarms(work, stand="S1")] == [
+            alarm.id
+        ]  # it still wants its answer
