@@ -1,7 +1,7 @@
 """Forms: what was typed, what is wrong with it, and where."""
 
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import date
 from typing import Annotated, TypeVar
 
@@ -11,6 +11,8 @@ from starlette.datastructures import FormData, UploadFile
 from app.errors import Invalid, Problem, problem
 from app.exchange.numbers import typed
 from app.i18n import gettext, translate
+from app.pages import labels
+from solver.errors import Message
 
 T = TypeVar("T")
 
@@ -73,8 +75,15 @@ def sentence(item: Problem) -> str:
     parts = [item.file, item.row and gettext("row %(row)d") % {"row": item.row},
              item.column and gettext("column %(column)s") % {"column": item.column}]  # fmt: skip
     where = ", ".join(part for part in parts if part)
-    text = translate(item.message)
+    text = translate(_with_roles(item.message))
     return f"{where}: {text}" if where else text
+
+
+def _with_roles(message: Message) -> Message:
+    """The message with the roles that it names in words."""
+    told = {name: ", ".join(labels.role(role) for role in message.values[name].split(", "))
+            for name in ("role", "roles") if name in message.values}  # fmt: skip
+    return replace(message, values={**message.values, **told})
 
 
 def negative(name: str, value: float | None) -> list[Problem]:

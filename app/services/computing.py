@@ -63,5 +63,5 @@ def _kept(
     kept = []
     for number, record in enumerate(records, start=1):
         kept.append(keep_record(files, record))
-        report(until * number / len(records), "storing records")
+        report(until * number / len(records), "keeping")
     return kept

@@ -8,8 +8,11 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
+from app.errors import Forbidden
+from app.i18n import speaking
+from app.pages.forms import sentence
 from app.services import access, gyros
-from app.services.lab import Lab
+from app.services.lab import Lab, Person
 from app.store import equipment
 
 
@@ -136,3 +139,12 @@ def test_without_alarms_the_page_says_what_would_stand_there(technician: TestCli
     assert "No alarms" in page
     assert "until somebody says why" in page
     assert "open alarms" not in technician.get("/").text
+
+
+def test_a_refusal_names_the_roles_in_words() -> None:
+    person = Person("irina", "I. Petrova", "technician", frozenset({"read", "upload"}))
+    with pytest.raises(Forbidden) as refused:
+        access.require_judge(person)
+    with speaking("ru"):
+        said = sentence(refused.value.problems[0])
+    assert said == "Это могут роли метролог, менеджер по качеству, администратор; ваша роль: техник."

@@ -9,8 +9,10 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.errors import Problem, problem
+from app.i18n import speaking
 from app.pages import jobs as job_pages
-from app.services import access, jobs, simulations
+from app.pages import labels
+from app.services import access, computing, jobs, simulations
 from app.services.lab import Lab
 from app.services.ledger import JobLedger
 from app.services.simulations import NewSimulation
@@ -143,3 +145,12 @@ def test_a_job_that_has_ended_is_told_at_once(technician: TestClient, stocked: L
     assert names == ["said", "state", "end"]
     # No look is waited for: far below what a stuck stream would take.
     assert (datetime.now(UTC) - began).total_seconds() < 5
+
+
+def test_every_phase_of_a_simulation_has_a_name(stocked: Lab, job_id: str) -> None:
+    task, phases = JobLedger(stocked).begin(job_id), set[str]()
+    assert task is not None
+    computing.simulate(task.payload, lambda _fraction, phase: phases.add(phase))
+    assert phases == {"simulating", "keeping", "solving"}
+    with speaking("ru"):
+        assert {labels.job_phase(phase) for phase in phases}.isdisjoint(phases)
