@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any, Final
 
 from app import figures
 from app.figures import Figure
 from app.i18n import gettext, ngettext
 from app.pages import drift_labels, drift_words
-from app.pages.drift_panels import ORDER
+from app.pages.drift_panels import ORDER, explained
 from app.pages.labels import Mark
 from app.services.drift.views import BaselineView, DriftPoint, GyroDrift, ParameterDrift
 
@@ -37,39 +38,69 @@ def by_session(
 
 
 @dataclass(frozen=True, slots=True)
+class Step:
+    """A step in words, and the first result after it; `explained`: an event is the reason."""
+
+    size: str
+    day: str
+    calibration: int
+    explained: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Trend:
-    """Course, last step and forecast of a parameter, in words; `leaves`: it is to leave its limits."""
+    """Course, steps and forecast of a parameter, in words; `leaves`: it is to leave its limits.
+
+    `largest` is the largest step that no event explains, where that is not the last step.
+    """
 
     parameter: str
     course: str
-    step: str
-    day: str
-    calibration: int | None
-    explained: bool
+    step: Step | None
+    largest: Step | None
     forecast: str
     leaves: bool
+    outside: bool
 
 
 def trends(found: GyroDrift) -> list[Trend]:
     """One row for each parameter that was studied."""
-    return [_trend(item, item.study) for item in found.parameters if item.study and item.study.get("trend")]
+    beyond = {alarm.parameter: alarm.at for alarm in found.alarms
+              if alarm.kind == "out-of-limits" and alarm.state in ("open", "acknowledged")}  # fmt: skip
+    return [
+        _trend(item, item.study, beyond.get(item.parameter))
+        for item in found.parameters if item.study and item.study.get("trend")
+    ]  # fmt: skip
 
 
-def _trend(item: ParameterDrift, study: Entry) -> Trend:
+def _trend(item: ParameterDrift, study: Entry, since: datetime | None) -> Trend:
     steps = [
         change for change in study.get("changes", ()) if change["kind"] == "step" and _is_significant(change)
     ]
     last = steps[-1] if steps else None
+    unexplained = [change for change in steps if not explained(change)]
+    largest = max(unexplained, key=lambda change: abs(change["size"]), default=None)
     ahead = study.get("forecast")
+    outside = (study.get("latest") or {}).get("verdict") == "fails"
     return Trend(
         parameter=item.parameter,
         course=drift_words.course(study["trend"], item.unit),
-        step=drift_words.change(last, item.unit) if last else "",
-        day=drift_words.day(last["at"]) if last else "",
-        calibration=last["calibration"] if last else None,
-        explained=bool(last and (last.get("event") or last.get("event_kind"))),
-        forecast=drift_words.forecast(ahead, item.unit, limited=not item.low is item.high is None),
-        leaves=bool(ahead and ahead.get("leaves")),
+        step=_step(last, item.unit) if last else None,
+        largest=_step(largest, item.unit) if largest and largest is not last else None,
+        forecast=drift_words.outside(since)
+        if outside
+        else drift_words.forecast(ahead, item.unit, limited=not item.low is item.high is None),
+        leaves=not outside and bool(ahead and ahead.get("leaves")),
+        outside=outside,
+    )
+
+
+def _step(change: Entry, unit: str) -> Step:
+    return Step(
+        drift_words.change(change, unit),
+        drift_words.day(change["at"]),
+        change["calibration"],
+        explained(change),
     )
 
 

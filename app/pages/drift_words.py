@@ -30,7 +30,9 @@ class Said:
 
 def sentence(template: str, values: Mapping[str, Any]) -> str:
     """A finding's or a method's sentence; units and days among its values as people read them."""
-    return translate(Said(template, {name: _readable(name, value) for name, value in values.items()}))
+    said = translate(Said(template, {name: _readable(name, value) for name, value in values.items()}))
+    unit = labels.unit(values["unit"]) if values.get("unit") else ""
+    return said.replace(f" {unit}", f"\u00a0{unit}") if unit else said  # a value and its unit on one line
 
 
 def _readable(name: str, value: Any) -> Any:
@@ -109,6 +111,13 @@ def a_month(per_year: float) -> float:
     return per_year * _DAYS_A_MONTH / 365.25
 
 
+def outside(since: datetime | None) -> str:
+    """Of a parameter whose latest value lies beyond its limits: since when, where it is known."""
+    if since is None:
+        return gettext("beyond its limits")
+    return gettext("beyond its limits since %(day)s") % {"day": figures.day(since)}
+
+
 def forecast(found: Entry | None, unit: str, *, limited: bool) -> str:
     """Whether and when the parameter is to leave its limits."""
     if not found or not found.get("at"):
@@ -122,6 +131,8 @@ def forecast(found: Entry | None, unit: str, *, limited: bool) -> str:
               "earliest": day(leaves["earliest"]), "latest": day(leaves["latest"])}  # fmt: skip
     if not leaves.get("date"):
         return gettext("may reach %(limit)s %(unit)s from %(earliest)s on") % values
+    if leaves["earliest"][:10] <= found["at"][0][:10]:
+        return gettext("reaches %(limit)s %(unit)s on %(day)s, perhaps already") % values
     if not leaves.get("latest"):
         return gettext("reaches %(limit)s %(unit)s on %(day)s (not before %(earliest)s)") % values
     return gettext("reaches %(limit)s %(unit)s on %(day)s (between %(earliest)s and %(latest)s)") % values

@@ -63,15 +63,16 @@ def _rules(table: SeriesTable, told: Told) -> Iterator[Finding]:
     ):
         for run in episodes(list(signals)):
             first, last = run[0], int(run[-1].places[-1])
-            values = {"unit": told.unit, "value": _at(table, told, last), "rule": rule,
-                      "count": len({int(place) for item in run for place in item.places})}  # fmt: skip
+            count = len({int(place) for item in run for place in item.places})
+            values = {"unit": told.unit, "value": _at(table, told, last), "rule": rule, "count": count}
             kind = "beyond-limits" if rule == "nelson-1" else rule
-            found = _finding(table, told, kind, first.raised, last, _sentence(kind), values, baseline)
+            found = _finding(table, told, kind, first.raised, last, sentence(kind, count), values, baseline)
             yield replace(found, since=iso(table["measured_at"][int(first.places[0])]))
 
 
-def _sentence(kind: str) -> Message:
-    known = {"beyond-limits": _BEYOND, "ewma": _EWMA, "cusum": _CUSUM}
+def sentence(kind: str, count: int) -> Message:
+    """What is said of a rule that so many values break."""
+    known = {"beyond-limits": _BEYOND if count > 1 else _BEYOND_ONE, "ewma": _EWMA, "cusum": _CUSUM}
     return known[kind] if kind in known else RULES[kind].description
 
 
@@ -94,8 +95,8 @@ def _steps(table: SeriesTable, told: Told) -> Iterator[Finding]:
         place = int(np.flatnonzero(table["calibration"] == change["calibration"])[0])
         values = {"unit": told.unit, "size": quantity(change["size"], change["u"], change=True),
                   "since": change["before"][:10], "day": change["at"][:10]}  # fmt: skip
-        sentence, circumstances = _circumstances(change)
-        found = _finding(table, told, "step", place, place, sentence, values | circumstances, None)
+        said, circumstances = _circumstances(change)
+        found = _finding(table, told, "step", place, place, said, values | circumstances, None)
         yield replace(
             found, since=change["since"], until=change["until"], explained=change["event_kind"] is not None
         )
@@ -148,9 +149,19 @@ def _limit_ahead(table: SeriesTable, told: Told, ahead: timedelta) -> Iterator[F
     if _moment(leaving["date"]) > table["measured_at"][last] + np.timedelta64(ahead):
         return
     values = {"unit": told.unit, "limit": leaving["limit"], "day": leaving["date"][:10],
-              "earliest": leaving["earliest"][:10], "latest": (leaving["latest"] or "")[:10] or "–"}  # fmt: skip
-    found = _finding(table, told, "limit-ahead", last, last, _AHEAD, values, None)
+              "earliest": leaving["earliest"][:10]}  # fmt: skip
+    if leaving["latest"]:
+        values["latest"] = leaving["latest"][:10]
+    said = ahead_of(leaving, table["measured_at"][last])
+    found = _finding(table, told, "limit-ahead", last, last, said, values, None)
     yield replace(found, since=told.entry["trend"]["since"])
+
+
+def ahead_of(leaving: Json, last: np.datetime64) -> Message:
+    """What is said of a limit ahead, after a last value at that time: the interval's ends as far as it has them."""
+    if _moment(leaving["earliest"]) <= last:
+        return _AHEAD_NOW
+    return _AHEAD if leaving["latest"] else _AHEAD_OPEN
 
 
 def _repeatability(table: SeriesTable, told: Told) -> Iterator[Finding]:
@@ -187,6 +198,7 @@ def _moment(text: str) -> np.datetime64:
 _BEYOND: Final = Message(
     "beyond-limits", "%(count)d beyond the control limits, the last at %(value)s %(unit)s."
 )
+_BEYOND_ONE: Final = Message("beyond-limits-one", "%(value)s %(unit)s lies beyond the control limits.")
 _EWMA: Final = Message(
     "ewma", "The weighted average left its limits: the level has shifted, by little or slowly."
 )
@@ -224,6 +236,14 @@ _TREND: Final = Message("trend", "Drifts by %(slope)s %(unit)s a year since %(si
 _OUT: Final = Message("out-of-limits", "%(value)s %(unit)s lies outside the limits %(low)g to %(high)g.")
 _AHEAD: Final = Message(
     "limit-ahead", "Will reach the limit %(limit)g %(unit)s about %(day)s (%(earliest)s to %(latest)s)."
+)
+_AHEAD_OPEN: Final = Message(
+    "limit-ahead-open",
+    "Will reach the limit %(limit)g %(unit)s about %(day)s (not before %(earliest)s).",
+)
+_AHEAD_NOW: Final = Message(
+    "limit-ahead-now",
+    "Will reach the limit %(limit)g %(unit)s about %(day)s; it may be there already.",
 )
 _SCATTER: Final = Message(
     "repeatability",

@@ -11,6 +11,7 @@ import pyarrow.parquet
 import pytest
 from fastapi.testclient import TestClient
 
+from app.pages import drift_words
 from app.services import access, gyros
 from app.services.drift import events, fleet
 from app.services.lab import Lab
@@ -339,3 +340,36 @@ def test_in_russian(technician: TestClient, results: list[int]) -> None:
     assert "Дрейф гироскопа 0417" in page
     assert charts(page)[0]["config"]["locale"]["number"]["decimal"] == ","
     assert "−0,7979" in page
+
+
+def test_a_limit_passed_is_not_forecast(technician: TestClient, lab: Lab) -> None:
+    with lab.write(access.SYSTEM) as work:
+        gyro = equipment.gyro(work.db, "0417")
+        assert gyro is not None
+        row = drift.study(work.db, gyro.id, None, "least-squares")
+        assert row is not None
+        document = json.loads(row.document or "")
+        document["parameters"]["w0y"]["latest"]["verdict"] = "fails"
+        row.document = json.dumps(document)
+    text = section(technician.get("/gyros/0417").text, "trend")
+    assert "beyond its limits" in text
+    assert "reaches" not in text
+
+
+def test_a_value_and_its_unit_stay_on_one_line() -> None:
+    values = {"unit": "deg/h", "value": {"value": 2.7, "expanded": 0.1, "sign": False}, "count": 1}
+    assert drift_words.sentence("%(value)s %(unit)s lies.", values) == "2.70 ± 0.10\u00a0°/h lies."
+
+
+@pytest.mark.parametrize(
+    ("earliest", "latest", "said"),
+    [
+        ("2026-11-05", "2027-02-01", "on 1 Dec 2026, perhaps already"),
+        ("2026-11-20", None, "on 1 Dec 2026 (not before 20 Nov 2026)"),
+        ("2026-11-20", "2027-02-01", "on 1 Dec 2026 (between 20 Nov 2026 and 1 Feb 2027)"),
+    ],
+)
+def test_a_forecast_names_only_days_to_come(earliest: str, latest: str | None, said: str) -> None:
+    leaves = {"limit": 2.65, "date": "2026-12-01", "earliest": earliest, "latest": latest}
+    found = {"at": ["2026-11-05"], "leaves": leaves}
+    assert drift_words.forecast(found, "deg/h/g", limited=True) == f"reaches 2.65 °/h/g {said}"
