@@ -209,6 +209,9 @@ def template(with_dates: bool, step: int) -> Spec:
         named("limits", theme.BEYOND_LABEL, y("y"), dy=-8),
         named("events", theme.LABEL, alt.value(-3), baseline="bottom"),
         named("today", theme.LABEL, alt.value(-3), baseline="bottom"),
-        named("changes", theme.BEYOND_LABEL, alt.value(alt.ExprRef("height")), baseline="bottom"),
+        *(
+            named("changes", look, alt.value(alt.ExprRef("height")), baseline="bottom", dy=-3)
+            for look in (theme.LABEL_GROUND, theme.BEYOND_LABEL)
+        ),
     ]
     return template_of(layers, height=HEIGHT_PX, values={"low": -1.0, "high": 1.0, "first": 0, "last": 1})

@@ -179,8 +179,11 @@ def template() -> Spec:
         *points("x", -5, theme.X_POINT),
         *points("y", 5, theme.Y_POINT),
         *points("beyond", 0, theme.BEYOND_POINT),
-        beyond.mark_text(**theme.BEYOND_LABEL, align="left", dx=10, aria=False).encode(
-            x=x, y=y("v"), text="label:N"
+        *(
+            beyond.transform_filter(f"indexof(numbers, datum.n) {half} length(numbers) / 2")
+            .mark_text(**theme.BEYOND_LABEL, align=align, dx=dx, aria=False)
+            .encode(x=x, y=y("v"), text="label:N")
+            for half, align, dx in (("<", "left", 10), (">=", "right", -10))
         ),
     ]  # fmt: skip
     values = {"low": -1.0, "high": 1.0, "numbers": [1], "labels": [["", ""]]}

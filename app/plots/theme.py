@@ -84,6 +84,14 @@ FORECAST_LINE: Final[Spec] = {"color": colour("series-1"), "strokeWidth": 1.25, 
 ZERO_LINE: Final[Spec] = {"color": colour("ink-3"), "strokeWidth": 1}
 LABEL: Final[Spec] = {"color": colour("ink-2"), "fontSize": TEXT_PX}
 BEYOND_LABEL: Final[Spec] = {"color": colour("deviation"), "fontSize": TEXT_PX, "fontWeight": 600}
+LABEL_GROUND: Final[Spec] = {
+    **BEYOND_LABEL,
+    "stroke": colour("paper"),
+    "strokeWidth": 4,
+    "strokeJoin": "round",
+}
+"""Under a label that comes to lie on lines: they do not run through its figures."""
+
 
 _MONTHS: Final = {
     "en": ["Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec"],

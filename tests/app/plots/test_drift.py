@@ -112,6 +112,12 @@ def test_a_repair_is_a_solid_rule_and_a_certificate_a_dotted_one():
     assert {"repair", "C-17"} <= set(re.findall(r">([^<>]+)</text>", svg))
 
 
+def test_a_steps_label_stands_on_ground_that_hides_the_lines_behind_it():
+    labels = re.findall(r"<text ([^>]*)>step \+0.5<", drawn(chart(changes=FULL["changes"])))
+    paper = theme.COLOURS["paper"][0]
+    assert [f'stroke="{paper}"' in label for label in labels] == [True, False]
+
+
 def test_layers_without_rows_are_left_out():
     names = {layer["data"]["name"] for layer in chart()["layer"]}
     assert names == {"line", "within", "beyond"}

@@ -166,6 +166,13 @@ def test_a_residual_beyond_its_limit_has_colour_shape_and_label():
     assert "7 y: −9.0" in svg
 
 
+@pytest.mark.parametrize(("position", "anchor"), [(2, "start"), (8, "start"), (9, "end"), (16, "end")])
+def test_the_label_of_a_residual_beyond_lies_towards_the_middle(position, anchor):
+    """A phone's chart has no room beside the last positions: their labels were cut."""
+    spec = plots.residuals(residual_points((position, "y")), PLACES, -3, "Residuals", "beyond 3 s.d.")
+    assert re.findall(r'<text text-anchor="(\w+)"[^>]*>7 y: −9.0<', drawn(spec)) == [anchor]
+
+
 def test_residual_limits_stand_at_three_standard_deviations():
     rows = residual_chart()["datasets"]["limits"]
     assert [(row["low"], row["high"]) for row in rows] == [(-6.0, 6.0)] * 16  # 3 · 0.002 °/h in 10⁻³ °/h
