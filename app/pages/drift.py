@@ -165,20 +165,28 @@ def _spec(
     )  # fmt: skip
 
 
-def _plotted(item: ParameterDrift, window: Window, column: str, rule: str) -> list[plots.DriftPoint]:
+def _plotted(item: ParameterDrift, window: Window, column: str, chart: str) -> list[plots.DriftPoint]:
     return [
         plots.DriftPoint(
-            point.at, point.charts[column] or 0.0, None, "beyond" if rule in point.signals else "within",
-            _named(point, point.charts[column]), "", drift_panels.href(point), window.part(point.at),
+            point.at, point.charts[column] or 0.0, None, "beyond" if _is_outside(point, column, chart) else "within",
+            _named(point, column, chart), "", drift_panels.href(point), window.part(point.at),
         )
         for point in item.statistics.get(column, ())
     ]  # fmt: skip
 
 
-def _named(point: DriftPoint, value: float | None) -> str:
-    return gettext("%(day)s, session %(session)d: %(value)s") % {
-        "day": figures.day(point.at), "session": point.session, "value": figures.significant(value, 3),
+def _is_outside(point: DriftPoint, column: str, chart: str) -> bool:
+    """Whether a statistic lies beyond the limits of its chart, also where that raises no alarm."""
+    value, low, high = (point.charts.get(name) for name in (column, f"{chart}_low", f"{chart}_high"))
+    return value is not None and ((high is not None and value > high) or (low is not None and value < low))
+
+
+def _named(point: DriftPoint, column: str, chart: str) -> str:
+    said = gettext("%(day)s, session %(session)d: %(value)s") % {
+        "day": figures.day(point.at), "session": point.session,
+        "value": figures.significant(point.charts[column], 3),
     }  # fmt: skip
+    return f"{said}, {gettext('beyond the control limit')}" if _is_outside(point, column, chart) else said
 
 
 @dataclass(frozen=True, slots=True)

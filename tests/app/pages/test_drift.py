@@ -2,6 +2,7 @@ import csv
 import html
 import io
 import json
+import math
 import re
 from pathlib import Path
 
@@ -83,6 +84,35 @@ def test_four_charts_of_a_real_study(technician: TestClient, really_studied: Non
     assert sums["line"]
     assert min(row["v"] for row in sums["line"]) < 0 <= max(row["v"] for row in sums["line"])
     assert {round(row["low"], 9) for row in sums["control"]} == {-5.0}
+
+
+def test_statistics_beyond_their_limits_are_marked_though_no_rule_watches_them(
+    technician: TestClient, really_studied: None
+) -> None:
+    """Which are beyond is read from the file; the baselines judge by single values alone."""
+    found = charts(technician.get("/gyros/0417/drift/w0y?period=all").text)[1:]
+    file = technician.get("/gyros/0417/drift/w0y.csv?period=all").text
+    rows = [
+        {name: float(text) for name, text in row.items() if name.startswith(_STATISTICS) and text}
+        | {"href": f"/results/{row['result']}"}
+        for row in csv.DictReader(io.StringIO(file))
+    ]
+    for spec, columns, limit in zip(
+        found, (["moving_range"], ["ewma"], ["cusum_above", "cusum_below"]), _STATISTICS, strict=True
+    ):
+        beyond = [
+            row["href"]
+            for name in columns
+            for row in rows
+            if name in row and not row.get(f"{limit}_low", -math.inf) <= row[name] <= row[f"{limit}_high"]
+        ]
+        marked = spec["datasets"].get("beyond", [])
+        assert sorted(row["href"] for row in marked) == sorted(beyond), limit
+        assert all("beyond the control limit" in row["name"] for row in marked)
+        assert beyond or limit == "moving_range"
+
+
+_STATISTICS = ("moving_range", "ewma", "cusum")
 
 
 def test_the_drift_that_was_laid_there_is_found(technician: TestClient, really_studied: None) -> None:
