@@ -1,6 +1,6 @@
 """Gyros: the list by status and type, a new one, its type and note."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Annotated, Any, Final, Literal
@@ -8,14 +8,15 @@ from typing import Annotated, Any, Final, Literal
 from fastapi import APIRouter, Depends, Query, Request, Response
 
 from app.errors import AppError
-from app.pages import labels
+from app.pages import drift_labels, labels
 from app.pages.base import Reader, TheLab, Writer, render, see
 from app.pages.forms import Fields, Form, Sent
 from app.pages.sparkline import Sparkline, sparkline
 from app.pages.tables import Row, csv_answer, json_answer
 from app.services import gyros, history
-from app.services.drift import due
+from app.services.drift import alarms, due
 from app.services.drift.due import Due
+from app.services.drift.views import AlarmView
 from app.services.lab import Work
 from app.services.views import GyroView
 from solver.records import PARAMETERS
@@ -25,6 +26,12 @@ router = APIRouter()
 STATUSES: Final = ("fails", "undetermined", "conditional", "no-limit", "conforms", "none")
 """Of a gyro by its latest result, the worst first."""
 
+_ALARM_AS: Final = {name: STATUSES.index(like) for name, like in (
+    ("serious", "fails"), ("warning", "conditional"), ("notice", "conditional"),
+)}  # fmt: skip
+_DUE_AS: Final = {"overdue": STATUSES.index("undetermined"), "due-soon": STATUSES.index("conditional")}
+"""As how bad a verdict an open alarm and a day due are counted."""
+_MOST_ALARMS: Final = 5000
 _PER_PAGE: Final = 50
 _BATCH: Final = 500
 _Key = Callable[[GyroView], Any]
@@ -40,11 +47,25 @@ def _drift(name: str) -> _Key:
 
 _SORTS: Final[dict[str, _Key]] = {
     "serial": lambda gyro: gyro.serial,
-    "status": lambda gyro: -STATUSES.index(labels.result_status(gyro.last_result)),
     "w0x": _drift("w0x"),
     "w0y": _drift("w0y"),
     "date": lambda gyro: gyro.last_measured_at or datetime.min.replace(tzinfo=UTC),
 }
+
+
+@dataclass(frozen=True, slots=True)
+class Needs:
+    """What is to be done with the gyros: their open alarms, the worst first, and when each is due."""
+
+    alarms: Mapping[str | None, Sequence[AlarmView]]
+    due: Mapping[str, Due]
+
+    def rank(self, gyro: GyroView) -> tuple[int, int]:
+        """For the order by status, the most urgent highest: by verdict, alarm and day due; then by verdict alone."""
+        verdict = STATUSES.index(labels.result_status(gyro.last_result))
+        worst = self.alarms[gyro.serial][0].severity if gyro.serial in self.alarms else ""
+        state = self.due[gyro.serial].state
+        return -min(verdict, _ALARM_AS.get(worst, verdict), _DUE_AS.get(state, verdict)), -verdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,16 +87,17 @@ def listing(
     """The gyros, those first with which something is to be done."""
     with lab.read(person) as work:
         everything = tuple(_all(work))
-        found = _ordered(_chosen(everything, wanted), sort)
+        needs = _needs(work)
+        found = _ordered(_chosen(everything, wanted), sort, needs)
         start = max(0, start)
         shown = found[start : start + _PER_PAGE]
         drifts = {gyro.serial: _year(work, gyro.serial) for gyro in shown if gyro.last_result}
-        due_on = due.due_of(work, [gyro.serial for gyro in shown])
         kinds = gyros.types(work)
     return render(
         request, "gyros/list.html", gyros=shown, total=len(found), start=start, drifts=drifts, kinds=kinds,
-        due_on=due_on, today=datetime.now(UTC).date(),
-        everything=len(everything), sort=sort if sort.removeprefix("-") in _SORTS else "-status", wanted=wanted,
+        due_on=needs.due, alarms_of=needs.alarms, alarm_mark=drift_labels.alarm,
+        everything=len(everything), sort=sort if sort.removeprefix("-") in (*_SORTS, "status") else "-status",
+        wanted=wanted,
         type_counts=_counts(_chosen(everything, replace(wanted, kind="")), lambda gyro: gyro.type),
         status_counts=_counts(
             _chosen(everything, replace(wanted, status="")), lambda gyro: labels.result_status(gyro.last_result)
@@ -90,9 +112,9 @@ def exported(
 ) -> Response:
     """The same list as a file."""
     with lab.read(person) as work:
-        found = _ordered(_chosen(tuple(_all(work)), wanted), sort)
-        due_on = {item.gyro: item for item in due.due_list(work)}
-        rows = [_row(gyro, due_on[gyro.serial]) for gyro in found]
+        needs = _needs(work)
+        found = _ordered(_chosen(tuple(_all(work)), wanted), sort, needs)
+        rows = [_row(gyro, needs.due[gyro.serial]) for gyro in found]
     return json_answer(rows) if form == "json" else csv_answer(rows, _COLUMNS, "gyros")
 
 
@@ -172,8 +194,15 @@ def _chosen(found: Sequence[GyroView], wanted: Selection) -> list[GyroView]:
     ]
 
 
-def _ordered(found: list[GyroView], sort: str) -> list[GyroView]:
-    key = _SORTS.get(sort.removeprefix("-"), _SORTS["status"])
+def _needs(work: Work) -> Needs:
+    by_gyro: dict[str | None, list[AlarmView]] = {}
+    for alarm in alarms.alarms(work, limit=_MOST_ALARMS):
+        by_gyro.setdefault(alarm.gyro, []).append(alarm)
+    return Needs(by_gyro, {item.gyro: item for item in due.due_list(work)})
+
+
+def _ordered(found: list[GyroView], sort: str, needs: Needs) -> list[GyroView]:
+    key = _SORTS.get(sort.removeprefix("-"), needs.rank)
     return sorted(sorted(found, key=_SORTS["serial"]), key=key, reverse=sort.startswith("-"))
 
 

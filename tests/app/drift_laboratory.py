@@ -58,10 +58,11 @@ def furnish(work: Work, now: datetime) -> list[int]:
     rows = [CertificateRow(theta, psi, 6.9, -16.4, 6.6) for theta, psi in _PLACES]
     for number in ("C-16", "C-17"):
         stands.add_certificate(work, "S1", number, date(2019, 1, 1), date(2100, 1, 1), rows)
-    return [_result(work, "0417", number, now - timedelta(days=days)) for number, days in enumerate(DAYS)]
+    return [add_result(work, "0417", number, now - timedelta(days=days)) for number, days in enumerate(DAYS)]
 
 
-def _result(work: Work, serial: str, number: int, at: datetime) -> int:
+def add_result(work: Work, serial: str, number: int, at: datetime) -> int:
+    """Lay in a result with the values of that number of the year; its id."""
     certificate = "C-16" if number < 3 else "C-17"
     session = open_session(work, NewSession(serial, "S1", certificate, new_start=True, started_at=at)).id
     opened = find_session(work, session)

@@ -1,11 +1,17 @@
 import csv
 import io
+import re
+from datetime import UTC, datetime, timedelta
 
+import drift_laboratory
 import pytest
+import sqlalchemy as sa
 from fastapi.testclient import TestClient
 
 from app.services import access, gyros
 from app.services.lab import Lab
+from app.store import equipment
+from app.store.tables import Alarm
 
 
 @pytest.fixture
@@ -40,6 +46,30 @@ def test_what_needs_a_hand_comes_first(technician: TestClient, stocked: Lab, res
         gyros.add_gyro(work, "0400", "GVK-6")
     assert _serials(technician.get("/gyros").text) == ["0417", "0400"]
     assert _serials(technician.get("/gyros?sort=status").text) == ["0400", "0417"]
+
+
+def test_alarms_and_a_day_that_is_past_come_before_what_is_well(technician: TestClient, lab: Lab) -> None:
+    """Of four gyros of one type one is beyond control, one overdue, one drifts, and one is well."""
+    now = datetime.now(UTC)
+    with lab.write(access.SYSTEM) as work:
+        results = drift_laboratory.furnish(work, now)
+        drift_laboratory.judge(work, now, results)  # of 0417, a serious alarm and a trend are open
+        gyros.set_interval(work, "GVK-6", 60)
+        for serial, days in (("0400", 4), ("0500", 70), ("0450", 4)):
+            gyros.add_gyro(work, serial, "GVK-6")
+            drift_laboratory.add_result(work, serial, 0, now - timedelta(days=days))
+        drift = work.db.scalars(sa.select(Alarm).where(Alarm.kind == "trend")).one()
+        row = equipment.gyro(work.db, "0450")
+        assert row is not None
+        drift.gyro_id = row.id
+    page = technician.get("/gyros").text
+    assert _serials(page) == ["0417", "0500", "0450", "0400"]
+    lines = [re.sub(r"<[^>]+>", " ", line) for line in page.split('class="id"')[1:]]
+    assert "Beyond control" in lines[0]
+    assert "Overdue" in lines[1]
+    assert "Drifting" in lines[2]
+    files = technician.get("/gyros.json?sort=-status").json()
+    assert [row["serial"] for row in files] == _serials(page)
 
 
 def test_counts_follow_the_rest_of_the_selection(technician: TestClient, several: Lab) -> None:
