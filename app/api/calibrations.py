@@ -38,7 +38,7 @@ def solve(session_id: Id, body: NewCalibration, caller: Uploader, response: Resp
 
 @router.get("/calibrations", response_model=Listing[CalibrationLine], responses=CSV_TOO)
 def listing(part: Annotated[CalibrationPart, Query()], caller: Reader, request: Request) -> Response:
-    """The newest result of each session, the newest first."""
+    """The newest result of each session, the last one measured first."""
     with caller.read() as work:
         found = calibrations.calibrations(
             work, gyro=part.gyro, type_name=part.type, before=part.before(), limit=part.limit

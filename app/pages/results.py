@@ -32,7 +32,7 @@ def listing(
 ) -> Response:  # fmt: skip
     """The newest result of each session."""
     with lab.read(person) as work:
-        found, following = _queue(work, order, gyro, before)
+        found, following = _queue(work, order, gyro, before, _PER_PAGE)
         known = [item.serial for item in gyros.gyros(work, limit=500).items if item.last_result]
     return render(
         request, "results/list.html", sessions=found, following=following, order=order, gyro=gyro,
@@ -41,7 +41,7 @@ def listing(
 
 
 def _queue(
-    work: Work, order: Order, gyro: str, before: int | None, limit: int = _PER_PAGE
+    work: Work, order: Order, gyro: str, before: int | None, limit: int
 ) -> tuple[Sequence[SessionView], str | None]:
     if order == "newest":
         page = calibrations.calibrations(work, gyro=gyro or None, before=before, limit=limit)
@@ -61,7 +61,7 @@ def exported(
 ) -> Response:
     """The same list as a file: one row for each parameter of each result."""
     with lab.read(person) as work:
-        found, _ = _queue(work, order, gyro, None, limit=100_000)
+        found, _ = _queue(work, order, gyro, None, 100_000)
     rows = [row for session in found for row in _rows(session)]
     return json_answer(rows) if form == "json" else csv_answer(rows, _COLUMNS, "results")
 

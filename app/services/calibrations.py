@@ -144,7 +144,7 @@ def calibrations(
     before: int | None = None,
     limit: int = 50,
 ) -> Page[SessionView]:
-    """Sessions that have a result, the newest result first, each with its newest result."""
+    """Sessions that have a result, the last one measured first, each with its newest result."""
     rows = results.calibrations(work.db, gyro=gyro, type_name=type_name, before=before, limit=limit + 1)
     items = views(work, [row.session for row in rows[:limit]])
     return Page(items, str(rows[limit - 1].id) if len(rows) > limit else None)

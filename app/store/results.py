@@ -6,6 +6,7 @@ from datetime import datetime
 import sqlalchemy as sa
 from sqlalchemy.orm import Session, aliased
 
+from app.store.measurement import LAST_FIRST, follows
 from app.store.tables import (
     Calibration,
     Gyro,
@@ -82,7 +83,7 @@ def calibrations(
     before: int | None = None,
     limit: int = 50,
 ) -> Sequence[Calibration]:
-    """The newest result of each session, the newest first, those below `before`."""
+    """The newest result of each session, the last one measured first, those after the result `before`."""
     newest = sa.select(sa.func.max(Calibration.id)).group_by(Calibration.session_id)
     query = (
         sa.select(Calibration)
@@ -90,7 +91,7 @@ def calibrations(
         .join(Gyro, Gyro.id == MeasuringSession.gyro_id)
         .join(GyroType, GyroType.id == Gyro.type_id)
         .where(Calibration.id.in_(newest))
-        .order_by(Calibration.id.desc())
+        .order_by(*LAST_FIRST)
         .limit(limit)
     )
     if gyro is not None:
@@ -98,7 +99,8 @@ def calibrations(
     if type_name is not None:
         query = query.where(GyroType.name == type_name)
     if before is not None:
-        query = query.where(Calibration.id < before)
+        shown = calibration(db, before)
+        query = query.where(follows(0 if shown is None else shown.session_id))
     return db.scalars(query).all()
 
 

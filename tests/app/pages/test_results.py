@@ -4,14 +4,17 @@ import io
 import json
 import re
 from collections.abc import Callable
-from datetime import date
+from datetime import UTC, date, datetime, timedelta
 
+import drift_laboratory
 import pytest
 from fastapi.testclient import TestClient
 
 from app.exchange.rows import CertificateRow, MeansRow
+from app.pages import results as pages
 from app.services import access, calibrations, gyros, ingest, sessions, stands
 from app.services.lab import Lab, Work
+from app.store import results as store
 
 
 def charts(page: str) -> list[dict]:
@@ -109,7 +112,7 @@ def test_the_verdict_names_what_made_it(
     with stocked.write(access.SYSTEM) as work:
         gyros.set_limits(work, "GVK-6", {"w0x": (-2.0, 2.0), "w0y": (-0.5, 0.5)})
     words = text_of(technician.get(f"/results/{result}").text)
-    assert re.search(r"ω0y = −0\.7\d+ °/h lies beyond its limit of ±0\.5\.", words)
+    assert re.search(r"ω0y = −0\.7\d+ ± 0\.\d+ °/h lies beyond its limit of ±0\.5\.", words)
     assert "Out of limits" in words
     worst = technician.get("/results", params={"order": "worst"}).text
     assert 'class="row-out"' in worst
@@ -121,7 +124,9 @@ def test_the_worst_comes_first_when_asked(
     with stocked.write(access.SYSTEM) as work:
         gyros.add_gyro(work, "0500", "tight")
         gyros.set_limits(work, "tight", {"w0x": (-1.0, 1.0)})
-        other = sessions.open_session(work, sessions.NewSession("0500", "S1")).id
+        other = sessions.open_session(
+            work, sessions.NewSession("0500", "S1", started_at=datetime(2026, 1, 12, tzinfo=UTC))
+        ).id
         ingest.save(work, other, _inputs(work, measured))
     bad, good = solving(stocked, other), solving(stocked, measured)
     newest, worst = (
@@ -130,6 +135,30 @@ def test_the_worst_comes_first_when_asked(
     assert newest.index(f'href="/results/{good}"') < newest.index(f'href="/results/{bad}"')
     assert worst.index(f'href="/results/{bad}"') < worst.index(f'href="/results/{good}"')
     assert f'href="/results/{bad}"' not in technician.get("/results", params={"gyro": "0417"}).text
+
+
+def test_the_last_one_measured_comes_first(
+    technician: TestClient, lab: Lab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Results stored in another order than they were measured in, page by page; the foot says how far each goes."""
+    monkeypatch.setattr(pages, "_PER_PAGE", 5)
+    now = datetime.now(UTC)
+    with lab.write(access.SYSTEM) as work:
+        results = drift_laboratory.furnish(work, now)
+        for number, days in ((results[-1], 1000), (results[0], 1)):
+            stored = store.calibration(work.db, number)
+            assert stored is not None
+            stored.session.started_at = now - timedelta(days=days)
+    measured = [results[0], *results[-2:0:-1], results[-1]]
+    shown: list[int] = []
+    address = "/results"
+    while address:
+        page = technician.get(address).text
+        shown += [int(number) for number in re.findall(r'class="id" href="/results/(\d+)"', page)]
+        following = re.search(r'href="([^"]*)" rel="next"', page)
+        assert (f"down to result no. {shown[-1]}" in page) == bool(following)
+        address = html.unescape(following[1]) if following else ""
+    assert shown == measured
 
 
 def _inputs(work: Work, session_id: int) -> list[ingest.Measured]:
