@@ -41,6 +41,15 @@
 
   const resized = new ResizeObserver((entries) => entries.forEach((entry) => drawSafely(entry.target)));
 
+  // A4 at 96 px to the inch, less the margins of the browser and of the page. Nothing observes sizes while it prints.
+  const PAPER_PX = 714;
+  const redraw = (fitting) => {
+    for (const element of document.querySelectorAll("[data-chart]")) {
+      const chart = charts.get(element);
+      chart?.view?.width(fitting(chart.width)).runAsync();
+    }
+  };
+
   const mount = (root) => {
     if (!window.vegaEmbed) return;
     for (const element of [root, ...root.querySelectorAll("[data-chart]")]) {
@@ -126,6 +135,8 @@
   };
 
   document.addEventListener("paste", paste);
+  window.addEventListener("beforeprint", () => redraw((width) => Math.min(width, PAPER_PX)));
+  window.addEventListener("afterprint", () => redraw((width) => width));
   document.addEventListener("visibilitychange", pause);
   document.addEventListener("DOMContentLoaded", () => {
     mount(document);
