@@ -9,9 +9,10 @@ from fastapi import APIRouter, Request, Response
 from app.errors import AppError, Invalid, NotFound, Problem, problem
 from app.figures import entered
 from app.pages import labels
+from app.pages.alarms import may_judge
 from app.pages.base import Reader, TheLab, Writer, render, see
 from app.pages.forms import Fields, Form, Sent
-from app.services import gyros
+from app.services import access, gyros
 from app.services.lab import Lab, Person
 from app.services.views import Nominal, TypeView
 from solver.records import PARAMETERS
@@ -64,7 +65,7 @@ def detail(request: Request, person: Reader, lab: TheLab, name: str) -> Response
         _field(parameter, SPREAD): entered(largest) for parameter, largest in kind.repeatability.items()
     }
     values[INTERVAL] = "" if kind.interval_days is None else str(kind.interval_days)
-    return _shown(request, kind, Form(dict.fromkeys(_FIELDS, "") | values))
+    return _shown(request, person, kind, Form(dict.fromkeys(_FIELDS, "") | values))
 
 
 @router.post("/types/{name}")
@@ -78,13 +79,14 @@ def change(request: Request, person: Writer, lab: TheLab, name: str, sent: Sent)
         fields.check()
         _keep(lab, person, name, stated)
     except AppError as error:
-        return _shown(request, kind, form.with_problems(*error.problems), error.status)
+        return _shown(request, person, kind, form.with_problems(*error.problems), error.status)
     return see("/gyros")
 
 
 def _keep(lab: Lab, person: Person, name: str, stated: _Stated) -> None:
-    """All or nothing; `Invalid` with what is wrong with any of it."""
+    """All or nothing: `Forbidden`, or `Invalid` with what is wrong with any of it."""
     with lab.write(person) as work:
+        access.require_judge(work.person)  # limits judge every result, also those that were signed
         problems = [
             *_refused(
                 lambda: gyros.set_limits(work, name, stated.limits, repeatability=stated.spread), LIMITS[0]
@@ -152,9 +154,10 @@ def _find(lab: Lab, person: Person, name: str) -> TypeView:
     raise NotFound(problem("unknown-type", "There is no type %(name)s.", name=name))
 
 
-def _shown(request: Request, kind: TypeView, form: Form, status: int = 200) -> Response:
+def _shown(request: Request, person: Person, kind: TypeView, form: Form, status: int = 200) -> Response:
     return render(
         request, "types/detail.html", status=status, kind=kind, form=form, unit_of=labels.PARAMETER_UNITS,
         limit_rows=[(name, [_field(name, column) for column in (*LIMITS, SPREAD)]) for name in PARAMETERS],
         nominal_rows=[(name, [_field(name, column) for column in NOMINAL]) for name in PARAMETERS],
+        may_write=may_judge(person),
     )  # fmt: skip

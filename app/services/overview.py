@@ -61,8 +61,12 @@ def _badness(session: SessionView) -> int:
 
 
 def stands_now(work: Work, stand_names: tuple[str, ...]) -> tuple[StandNow, ...]:
-    """Each stand with its newest session that is under way, if there is one."""
-    open_ones = {item.stand: item for item in reversed(_unsolved(work)) if item.state in _UNDER_WAY}
+    """Each stand with its newest session that is under way, if there is one; a simulation occupies none."""
+    open_ones = {
+        item.stand: item
+        for item in reversed(_unsolved(work))
+        if item.state in _UNDER_WAY and item.origin != "simulation"
+    }
     return tuple(StandNow(name, open_ones.get(name)) for name in stand_names)
 
 

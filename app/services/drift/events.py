@@ -123,11 +123,10 @@ def _changes(table: SeriesTable, gyro: str) -> Iterator[EventView]:
     for kind, changes in places.items():
         column = "solver_version" if kind == "solver" else kind
         for place in np.flatnonzero(changes) + 1:
-            between = times[place - 1] + (times[place] - times[place - 1]) / 2
             yield EventView(
                 None,
                 kind,
-                aware(between),
+                aware(times[place]),
                 gyro,
                 None,
                 str(table[column][place]),

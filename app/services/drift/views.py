@@ -41,7 +41,7 @@ class EventView:
     kind
         Entered: repair, adjustment, moved, method, other. Derived: certificate, stand, solver.
     at
-        When; of a derived one the middle between the session before it and the first one after.
+        When; of a derived one the first session that it was found in.
     gyro, stand
         Whose it is, the one or the other. A derived one is its gyro's, and `note` says what is new: the
         certificate's number, the stand's name, the solver's version.
