@@ -7,6 +7,8 @@ pytestmark = pytest.mark.browser
 PAPER_PX = 718
 """A4, 210 mm at 96 px to the inch, less the 0.4 inch that Chromium leaves on either side."""
 
+_WIDTHS = "[...document.querySelectorAll('[data-chart] svg')].map((svg) => Number(svg.getAttribute('width')))"
+
 
 @pytest.mark.parametrize("path", ["/gyros/0423", "/results/75", "/stands/S1/drift"])
 def test_a_dark_page_prints_on_white_paper_and_fits_it(demonstration, open_context, path):
@@ -15,17 +17,14 @@ def test_a_dark_page_prints_on_white_paper_and_fits_it(demonstration, open_conte
     page.goto(demonstration.url + path)
     for chart in page.locator("[data-chart]").all():
         chart.locator("svg").first.wait_for()
-    before = page.locator("[data-chart] svg").first.get_attribute("width")
+    before = page.evaluate(_WIDTHS)
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
-    drawn = (
-        "() => [...document.querySelectorAll('[data-chart] svg')].map((svg) => +svg.getAttribute('width'))"
-    )
-    page.wait_for_function(f"Math.max(...({drawn})()) <= {PAPER_PX}")
+    assert max(page.evaluate(_WIDTHS)) <= PAPER_PX
     page.evaluate("dispatchEvent(new Event('afterprint'))")
-    page.wait_for_function(f"({drawn})()[0] == {before}")
+    assert page.evaluate(_WIDTHS) == before
     page.emulate_media(media="print", color_scheme="dark")
     page.set_viewport_size({"width": PAPER_PX, "height": 1000})
-    page.wait_for_function("document.documentElement.scrollWidth == document.documentElement.clientWidth")
+    assert page.evaluate("document.documentElement.scrollWidth") == PAPER_PX
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(252, 252, 251)"
 
 
