@@ -8,7 +8,7 @@ from typing import Any, Final
 from markupsafe import Markup
 
 from app import figures
-from app.i18n import gettext, translate
+from app.i18n import gettext, localised, translate
 from app.pages import drift_labels, labels
 from app.services.drift.views import AlarmView
 from app.services.views import COVERAGE_FACTOR
@@ -48,6 +48,8 @@ def _readable(name: str, value: Any) -> Any:
         return drift_labels.rule(value)
     if name == "event":
         return drift_labels.event(value)
+    if name == "probability":
+        return localised(value)
     if name == "parameter" and value in labels.PARAMETER_NAMES:
         return labels.symbol_text(value)
     moment = _moment(value)

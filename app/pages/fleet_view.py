@@ -13,6 +13,7 @@ from app.pages.result_view import limit_text
 from app.services.drift.due import STATES
 from app.services.drift.fleet_statistics import TOGETHER
 from app.services.drift.fleet_views import Correlated, Distribution, Fleet, FleetGyro, Pooled, Standing
+from app.services.views import COVERAGE_FACTOR
 from solver.records import PARAMETERS
 
 ORDER: Final = ("w0x", "w0y", "wg", "wk", "kx", "ky", "kxy", "kyx")
@@ -43,7 +44,7 @@ class Row:
     item: Standing | None
     shown: Measured | None
     slope: Figure
-    u_slope: Figure
+    expanded: Figure
     drifts: bool
     scatter: Figure
     standing: str
@@ -136,10 +137,15 @@ def rows(fleet: Fleet, parameter: str, sort: str) -> list[Row]:
         fleet.gyros, key=lambda gyro: key(gyro, gyro.parameters.get(parameter)), reverse=sort.startswith("-")
     )
     known = [item for gyro in fleet.gyros if (item := gyro.parameters.get(parameter))]
-    slopes = _places([item.u_slope for item in known])
+    slopes = _places([_expanded(item) for item in known])
     largest = max((item.scatter or 0.0 for item in known), default=0.0)
     scatters = min(6, max(0, (decimals_of(largest) or 2) + 1))
     return [_row(gyro, gyro.parameters.get(parameter), slopes, scatters) for gyro in ordered]
+
+
+def _expanded(item: Standing | None) -> float | None:
+    """U of the change per year."""
+    return None if item is None or item.u_slope is None else COVERAGE_FACTOR * item.u_slope
 
 
 def _places(values: Sequence[float | None]) -> int:
@@ -152,7 +158,7 @@ def _row(gyro: FleetGyro, item: Standing | None, slopes: int, scatters: int) -> 
     known = item is not None and item.value.value is not None
     return Row(
         gyro, item, measured(item.value.value, item.value.expanded) if item and known else None,
-        figure(item.slope if item else None, slopes, sign=True), figure(item.u_slope if item else None, slopes),
+        figure(item.slope if item else None, slopes, sign=True), figure(_expanded(item), slopes),
         bool(item and item.p_slope is not None and item.p_slope < 0.05),
         figure(item.scatter if item else None, scatters),
         "" if item is None or item.standing is None else f"{plain(round(100 * item.standing))} %",

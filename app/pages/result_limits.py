@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from app.exchange.json_values import message_from
-from app.figures import Figure, figure, plain, significant
+from app.figures import Figure, decimals_of, figure, plain, significant
 from app.i18n import gettext, marked, translate
 from app.pages import labels
 from solver.records import PARAMETERS
@@ -27,6 +27,8 @@ SOURCES: Final = {
 """Lines of a budget in words; pass through `gettext`."""
 _MOST_BARS: Final = 5
 _SMALLEST: Final = 0.005
+_NOISE: Final = 1e-9
+"""Of the combined uncertainty, below which a line's part is rounding of the computation."""
 
 Json = Mapping[str, Any]
 
@@ -101,12 +103,20 @@ class Budget:
     def lines(self) -> list[tuple[str, list[str]]]:
         """Every line in words, with the standard uncertainty that it gives each parameter."""
         return [
-            (
-                _source(line),
-                [significant(line["standard_uncertainties"][name], 2) for name in PARAMETERS],
-            )
+            (_source(line), [self._part(name, line["standard_uncertainties"][name]) for name in PARAMETERS])
             for line in self._lines
         ]
+
+    def _part(self, name: str, u: float | None) -> str:
+        """A line's part down to the third digit of the combined u, so that points stand in one line."""
+        whole = self._parameters.get(name, {}).get("standard_uncertainty")
+        decimals = decimals_of(whole, 3)
+        if u is None or decimals is None:
+            return significant(u, 2)
+        if abs(u) <= _NOISE * whole:
+            return plain(0.0)
+        least = 10.0**-decimals
+        return f"< {figure(least, decimals)}" if abs(u) < 0.5 * least else str(figure(u, decimals))
 
     @property
     def sums(self) -> list[Sum]:

@@ -83,7 +83,7 @@ def alarms(document: Json) -> Iterator[Finding]:
         values: dict[str, Any] = {
             "since": item["since"][:10],
             "day": item["until"][:10],
-            "probability": item["probability"],
+            "probability": _sure(item["probability"]),
             "size": quantity(item["size_arcsec"], item["u_arcsec"], change=True),
             "gyro": item["gyro"],
         }
@@ -91,6 +91,11 @@ def alarms(document: Json) -> Iterator[Finding]:
             None, kind, item["calibration"], item["calibration"], item["since"], item["until"],
             sentence.template, values, explained=item["event"] is not None,
         )  # fmt: skip
+
+
+def _sure(probability: float) -> str:
+    """A probability that is near to one, as a sentence gives it."""
+    return "> 0.999" if probability > 0.999 else f"{probability:.3f}"
 
 
 def _kind(item: Json) -> str | None:
@@ -104,16 +109,16 @@ def _kind(item: Json) -> str | None:
 _SENTENCES: Final = {
     "stand-azimuth": Message(
         "stand-azimuth", "The base turned by %(size)s″ about the vertical between %(since)s and "
-        "%(day)s; probability %(probability).3g."),
+        "%(day)s; probability %(probability)s."),
     "stand-level-north": Message(
         "stand-level-north", "The base tilted by %(size)s″ about north between %(since)s and "
-        "%(day)s; probability %(probability).3g."),
+        "%(day)s; probability %(probability)s."),
     "stand-level-east": Message(
         "stand-level-east", "The base tilted by %(size)s″ about east between %(since)s and "
-        "%(day)s; probability %(probability).3g."),
+        "%(day)s; probability %(probability)s."),
     "stand-certificate": Message(
         "stand-certificate", "At the new certificate of %(day)s all gyros changed together by more than the "
-        "certificates state; probability %(probability).3g."),
+        "certificates state; probability %(probability)s."),
 }  # fmt: skip
 _UNCLEAR: Final = Message(
     "stand-or-gyro", "Between %(since)s and %(day)s the base tilted by %(size)s″ about east, or one "

@@ -74,6 +74,16 @@ def test_a_share_below_half_a_percent_is_no_zero():
     assert [bar.text for bar in budget.rows[0].shares] == ["100", "<1"]
 
 
+def test_parts_of_an_uncertainty_end_with_its_third_digit_and_rounding_is_zero():
+    """u = 0.0123: parts down to 10⁻⁴; what is smaller still is told from the rounding of the computation."""
+    parts = [0.0123, 0.001234, 4e-6, 3.3e-20, 0.0]
+    lines = [
+        line("currents", 1.0) | {"standard_uncertainties": dict.fromkeys(PARAMETERS, part)} for part in parts
+    ]
+    told = Budget({"budget": lines, "parameters": parameters()}).lines
+    assert [cells[0] for _, cells in told] == ["0.0123", "0.0012", "< 0.0001", "0", "0"]
+
+
 def test_without_a_budget_there_is_nothing_to_show():
     assert not Budget({})
     assert Model.of({}) is None
