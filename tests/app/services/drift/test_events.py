@@ -64,7 +64,7 @@ def test_the_sessions_tell_of_another_stand_certificate_and_solver(lab, history,
     assert [(item.kind, item.note, item.session) for item in told] == [
         ("certificate", "C-18", 13), ("stand", "S2", 14),
     ]  # fmt: skip
-    assert told[0].at == BEGIN + 11.5 * MONTH
+    assert told[0].at == BEGIN + 12 * MONTH
     assert told[0].derived
 
 
